@@ -1,0 +1,193 @@
+// What Python sees of the native core. Shapes are checked here, meaning in Python; the interpreter is free meanwhile.
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
+
+#include "keypoints.hpp"
+#include "least_squares.hpp"
+#include "point_field.hpp"
+#include "point_tree.hpp"
+#include "surfels.hpp"
+#include "thinning.hpp"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+using namespace fieldalign;
+
+namespace {
+
+template <class Real>
+using Points = nb::ndarray<const Real, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+using Rows6 = nb::ndarray<const double, nb::shape<-1, 6>, nb::c_contig, nb::device::cpu>;
+using Places = nb::ndarray<const std::uint32_t, nb::shape<-1>, nb::c_contig, nb::device::cpu>;
+using Values = nb::ndarray<const double, nb::shape<-1>, nb::c_contig, nb::device::cpu>;
+template <class T>
+using Array = nb::ndarray<nb::numpy, T>;
+
+template <class Real>
+PointsView<Real> view(const Points<Real>& points) {
+  return {points.data(), points.shape(0)};
+}
+
+// A NumPy array that owns what `values` held.
+template <class T>
+Array<T> array(std::vector<T>&& values, std::initializer_list<std::size_t> shape) {
+  auto* kept = new std::vector<T>(std::move(values));
+  nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<std::vector<T>*>(p); });
+  return Array<T>(kept->data(), shape, owner);
+}
+
+int checked_neighbours(int k) {
+  if (k < 1 || k > PointTree::kMaxNeighbours) throw std::invalid_argument("neighbours must be 1 to 64");
+  return k;
+}
+
+template <class Real>
+void construct(PointTree* self, Points<Real> points, int threads) {
+  nb::gil_scoped_release free;
+  new (self) PointTree(view(points), threads);
+}
+
+template <class Real>
+auto survey_points(Points<Real> points, int threads) {
+  Survey all;
+  {
+    nb::gil_scoped_release free;
+    all = survey(points.shape(0), [all_points = view(points)](std::size_t i) { return all_points[i]; }, threads);
+  }
+  const auto [lo, hi] = all.bounds;
+  const Vec3 mean = (1.0 / static_cast<double>(points.shape(0))) * all.sum;
+  return std::make_pair(array(std::vector<double>{lo.x, lo.y, lo.z, hi.x, hi.y, hi.z}, {2, 3}),
+                        array(std::vector<double>{mean.x, mean.y, mean.z}, {3}));
+}
+
+auto nearest(const PointTree& tree, Points<double> queries, int k, int threads) {
+  const std::size_t n = queries.shape(0), width = std::min<std::size_t>(checked_neighbours(k), tree.size());
+  std::vector<double> distances(n * width);
+  std::vector<std::int64_t> rows(n * width);
+  {
+    nb::gil_scoped_release free;
+    parallel_blocks(n, 128, threads, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        KNearest found(static_cast<int>(width));
+        tree.visit(view(queries)[i] - tree.centre(), found);
+        for (int j = 0; j < found.found; ++j) {
+          distances[i * width + j] = std::sqrt(found.squared[j]);
+          rows[i * width + j] = tree.row(found.position[j]);
+        }
+      }
+    });
+  }
+  return std::make_pair(array(std::move(distances), {n, width}), array(std::move(rows), {n, width}));
+}
+
+// value, gradient, foot and place of the distance field, for the mean over the k nearest points.
+nb::tuple sample(const PointTree& tree, Points<double> queries, int k, std::optional<Places> guess, int threads) {
+  const std::size_t n = queries.shape(0);
+  checked_neighbours(k);
+  std::vector<double> value(n), gradient(3 * n), foot(3 * n);
+  std::vector<std::uint32_t> place(n);
+  if (guess) {
+    if (guess->shape(0) != n) throw std::invalid_argument("queries and guess differ in length");
+    std::copy_n(guess->data(), n, place.begin());
+    if (std::any_of(place.begin(), place.end(), [&](std::uint32_t p) { return p >= tree.size(); }))
+      throw std::invalid_argument("guess holds places that the tree has not");
+  }
+  {
+    nb::gil_scoped_release free;
+    parallel_blocks(n, 128, threads, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        const Vec3 query = view(queries)[i] - tree.centre();
+        const FieldSample s = k == 1 ? nearest_point_field(tree, query, place[i]) : mean_point_field(tree, query, k);
+        const Vec3 at = s.foot + tree.centre();
+        value[i] = s.value;
+        gradient[3 * i] = s.gradient.x, gradient[3 * i + 1] = s.gradient.y, gradient[3 * i + 2] = s.gradient.z;
+        foot[3 * i] = at.x, foot[3 * i + 1] = at.y, foot[3 * i + 2] = at.z;
+      }
+    });
+  }
+  return nb::make_tuple(array(std::move(value), {n}), array(std::move(gradient), {n, 3}),
+                        array(std::move(foot), {n, 3}), array(std::move(place), {n}));
+}
+
+Array<double> normals(const PointTree& tree, Points<double> queries, int k, int threads) {
+  const std::size_t n = queries.shape(0);
+  checked_neighbours(k);
+  std::vector<double> result(3 * n);
+  {
+    nb::gil_scoped_release free;
+    plane_normals(tree, view(queries), k, threads, result.data());
+  }
+  return array(std::move(result), {n, 3});
+}
+
+Array<std::uint32_t> keypoints(const PointTree& tree, double salient_radius, double non_max_radius, double gamma_21,
+                               double gamma_32, int min_neighbours, int threads) {
+  std::vector<std::uint32_t> rows;
+  {
+    nb::gil_scoped_release free;
+    rows = iss_keypoints(tree, {salient_radius, non_max_radius, gamma_21, gamma_32, min_neighbours}, threads);
+  }
+  const std::size_t n = rows.size();
+  return array(std::move(rows), {n});
+}
+
+template <class Real>
+auto thin_points(Points<Real> points, Points<double> bounds, double voxel, int threads) {
+  Thinned thinned;
+  {
+    nb::gil_scoped_release free;
+    thinned = thin(view(points), view(bounds)[0], view(bounds)[1], voxel, threads);
+  }
+  const std::size_t n = thinned.means.size();
+  std::vector<double> means(3 * n);
+  for (std::size_t i = 0; i < n; ++i)
+    means[3 * i] = thinned.means[i].x, means[3 * i + 1] = thinned.means[i].y, means[3 * i + 2] = thinned.means[i].z;
+  return std::make_pair(array(std::move(means), {n, 3}), array(std::move(thinned.first), {n}));
+}
+
+auto weighted_normal_equations(Rows6 J, Values r, Values w) {
+  if (r.shape(0) != J.shape(0) || w.shape(0) != J.shape(0)) throw std::invalid_argument("J, r and w differ in length");
+  const NormalEquations sums = normal_equations(J.data(), r.data(), w.data(), J.shape(0));
+  return std::make_pair(array(std::vector<double>(sums.H.begin(), sums.H.end()), {6, 6}),
+                        array(std::vector<double>(sums.g.begin(), sums.g.end()), {6}));
+}
+
+Array<std::int64_t> count_equal(Points<double> points) {
+  std::vector<std::int64_t> counts(points.shape(0));
+  multiplicity(points.data(), points.shape(0), counts.data());
+  return array(std::move(counts), {points.shape(0)});
+}
+
+constexpr const char* kSurveyDoc =
+    "Lowest and highest corner (2, 3) and mean (3,) of points (n, 3); the mean is not finite where a coordinate is not.";
+constexpr const char* kThinDoc = "Mean (m, 3) and first row (m,) of the points of each occupied voxel.";
+
+}  // namespace
+
+NB_MODULE(_core, m) {
+  m.doc() = "The native core of fieldalign: what loops over points.";
+  nb::class_<PointTree>(m, "PointTree", "Exact nearest neighbours among n points.")
+      .def("__init__", &construct<float>, "points"_a.noconvert(), "threads"_a)
+      .def("__init__", &construct<double>, "points"_a.noconvert(), "threads"_a)
+      .def("__len__", &PointTree::size)
+      .def("nearest", &nearest, "queries"_a, "neighbours"_a, "threads"_a,
+           "Distances (n, k) and rows (n, k) of the k nearest points, nearest first.")
+      .def("sample", &sample, "queries"_a, "neighbours"_a, "guess"_a.none(), "threads"_a,
+           "value (n,), gradient (n, 3), foot (n, 3) and its place (n,) of the field of mean distance to the k nearest\n"
+           "points; a place of an earlier sample, given as a guess, changes nothing but the time.")
+      .def("normals", &normals, "queries"_a, "neighbours"_a, "threads"_a,
+           "Unit normals (n, 3) of the planes through the k nearest points.")
+      .def("keypoints", &keypoints, "salient_radius"_a, "non_max_radius"_a, "gamma_21"_a, "gamma_32"_a,
+           "min_neighbours"_a, "threads"_a, "Rows of the ISS keypoints, ascending.");
+  m.def("survey", &survey_points<float>, "points"_a.noconvert(), "threads"_a, kSurveyDoc);
+  m.def("survey", &survey_points<double>, "points"_a.noconvert(), "threads"_a, kSurveyDoc);
+  m.def("thin", &thin_points<float>, "points"_a.noconvert(), "bounds"_a, "voxel"_a, "threads"_a,
+        kThinDoc);
+  m.def("thin", &thin_points<double>, "points"_a.noconvert(), "bounds"_a, "voxel"_a, "threads"_a,
+        kThinDoc);
+  m.def("normal_equations", &weighted_normal_equations, "J"_a, "r"_a, "w"_a,
+        "H = sum w J^T J (6, 6) and g = sum w J^T r (6,), over rows (n, 6), (n,), (n,).");
+  m.def("count_equal", &count_equal, "points"_a, "For each point (n, 3), how many of them equal it.");
+}

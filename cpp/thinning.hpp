@@ -1,0 +1,50 @@
+// One point for each occupied voxel.
+#pragma once
+
+#include <stdexcept>
+
+#include "points_view.hpp"
+#include "radix_sort.hpp"
+
+namespace fieldalign {
+
+struct Thinned {
+  std::vector<Vec3> means;            // of the points of each voxel
+  std::vector<std::uint32_t> first;   // the lowest row of each voxel
+};
+
+// Voxels of edge `voxel` whose lattice begins at the points' own lower corner `lo`, so that a shifted cloud is thinned
+// alike; `hi` is the upper corner. In the order of the lattice.
+template <class Real>
+Thinned thin(PointsView<Real> points, Vec3 lo, Vec3 hi, double voxel, int threads) {
+  const auto width = [&](double extent) {
+    const double cells = extent / voxel + 1;
+    if (!(cells < 2097152)) throw std::invalid_argument("voxel is less than 1 / 2097152 of the cloud's extent");
+    int bits = 1;
+    while ((1u << bits) < static_cast<std::uint32_t>(cells) + 1) ++bits;
+    return bits;
+  };
+  const Vec3 extent = hi - lo;
+  const int bx = width(extent.x), by = width(extent.y), bz = width(extent.z);
+  constexpr std::size_t block = 16384;
+  std::vector<Keyed<std::uint64_t>> order(points.n);
+  parallel_blocks(points.n, block, threads, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const Vec3 p = points[i] - lo;
+      const auto cell = [&](double offset) { return static_cast<std::uint64_t>(offset / voxel); };
+      order[i] = {(cell(p.z) << (bx + by)) | (cell(p.y) << bx) | cell(p.x), static_cast<std::uint32_t>(i)};
+    }
+  });
+  radix_sort<std::uint64_t>(order, bx + by + bz, threads);
+  Thinned result;
+  for (std::size_t i = 0; i < order.size();) {
+    Vec3 sum;
+    const std::size_t begin = i;
+    for (; i < order.size() && order[i].key == order[begin].key; ++i) sum = sum + (points[order[i].index] - lo);
+    result.means.push_back(lo + (1.0 / static_cast<double>(i - begin)) * sum);
+    result.first.push_back(order[begin].index);
+  }
+  return result;
+}
+
+}  // namespace fieldalign

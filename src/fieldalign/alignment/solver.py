@@ -1,0 +1,73 @@
+"""The paper's method: two fixed fields, and pseudo points that move between them (Fig. 3)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..fields import DistanceField, FieldSample, sampled
+from ..fields.protocol import Floats
+from ..motions import apply, exp_twist, inverse, nearest_rotation, translation
+from ..settings import Settings
+from .residual import jacobian, residual
+from .truncation import Mask, truncate
+from .weights import direct, reweighted
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One iteration: its increment (6,), the mean |residual| (unit^2) and the number of pseudo points that were kept."""
+
+    increment: Floats
+    cost: float
+    kept: int
+
+
+@dataclass(frozen=True, eq=False)
+class Alignment:
+    """Where the loop ended: the motion, each iteration, and what the last one saw."""
+
+    T_target_source: Floats
+    steps: tuple[Step, ...]
+    kept: Mask
+    strict: bool  # the kept ones passed truncation without its rules being relaxed
+    weights: Floats
+
+
+def align(
+    source: DistanceField,
+    target_features: FieldSample,
+    pseudo: Floats,
+    T_start: Floats,
+    centres: tuple[Floats, Floats],
+    settings: Settings,
+) -> Alignment:
+    """Moves the pseudo points (L, 3) of the target's frame until both fields say the same of them.
+
+    target_features is phi(P_tau, P_a), the target's field at `pseudo`; T_start (4, 4) the first guess of T_target_source;
+    centres (3,) those of source and target, about which the increments turn.
+    """
+    in_source, in_target = translation(centres[0]), translation(centres[1])
+    P_a = apply(inverse(in_target), pseudo)
+    G_inv = inverse(inverse(in_target) @ T_start @ in_source)  # G^-1(xi): target -> source, both centred
+    weights = np.ones(len(pseudo))
+    steps: list[Step] = []
+    at_source: FieldSample | None = None
+    for _ in range(settings.max_iterations):
+        x = apply(G_inv, P_a)                                             # G^-1(xi_) P_a
+        at_source = sampled(source, x + centres[0], at_source)   # phi(P_S, G^-1(xi_) P_a), eq. (9)
+        r = residual(at_source, target_features)                          # eq. (11)
+        kept, strict = truncate(at_source, target_features, G_inv[:3, :3], settings)  # Sec. IV-D
+        J = jacobian(at_source, x)[kept]                                  # eq. (14), (15)
+        if settings.irls:
+            dx, weights[kept] = reweighted(J, r[kept], weights[kept], settings)  # Sec. IV-C
+        else:
+            dx = direct(J, r[kept])                                       # eq. (16)
+        G_inv = exp_twist(dx) @ G_inv
+        steps.append(Step(dx, float(np.abs(r[kept]).mean()), int(kept.sum())))
+        if np.linalg.norm(dx / [1, 1, 1, *3 * [settings.unit]]) < settings.tolerance:
+            break
+    G_inv[:3, :3] = nearest_rotation(G_inv[:3, :3])
+    T = in_target @ inverse(G_inv) @ inverse(in_source)
+    return Alignment(T, tuple(steps), kept, strict, weights)

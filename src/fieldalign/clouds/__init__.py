@@ -1,0 +1,1 @@
+"""Clouds: the type, reading and writing, thinning, simulated scans."""

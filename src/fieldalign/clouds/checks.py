@@ -1,0 +1,81 @@
+"""What must hold of points before they are registered."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .. import _core
+from ..errors import ArgumentError
+from .cloud import as_points
+
+LARGEST = 1e15  # of a coordinate: beyond, float64 leaves less than a unit of resolution
+
+
+@dataclass(frozen=True, eq=False)
+class Checked:
+    """Points (N, 3) in which nothing is wrong, the corners (2, 3) of their bounding box, and their mean (3,)."""
+
+    points: NDArray[Any]
+    bounds: NDArray[np.float64]
+    mean: NDArray[np.float64]
+
+
+def checked_points(values: ArrayLike, name: str, threads: int) -> Checked:
+    """Points (N, 3) that are finite, of a size float64 can hold, and at least 3 of them distinct.
+
+    Raises ArgumentError that names the argument otherwise; warns where float32 has already lost precision.
+    """
+    points = as_points(values, name)
+    _check_distinct(points, name)
+    bounds, mean = _core.survey(points, threads)
+    if not np.isfinite(mean).all():
+        _raise_not_finite(points, name)
+    largest = float(np.abs(bounds).max())
+    if largest > LARGEST:
+        raise ArgumentError(f"{name} must have coordinates below {LARGEST:g}, but the largest is {largest:g}")
+    _warn_of_lost_precision(points, name, largest, float(np.ptp(bounds, axis=0).max()))
+    return Checked(points, bounds, mean)
+
+
+def without_missing(points: NDArray[Any], name: str, drop: bool, threads: int) -> tuple[NDArray[Any], int]:
+    """The points without NaN rows, and how many those were; infinity raises, and NaN too where `drop` is false."""
+    if not len(points) or np.isfinite(_core.survey(points, threads)[1]).all():
+        return points, 0
+    missing = np.isnan(points).any(axis=1)
+    if not drop or np.isinf(points).any():
+        _raise_not_finite(points, name)
+    return points[~missing], int(missing.sum())
+
+
+def _raise_not_finite(points: NDArray[Any], name: str) -> None:
+    bad = ~np.isfinite(points).all(axis=1)
+    if not bad.any():  # finite values whose sum is not
+        raise ArgumentError(f"{name} must have coordinates below {LARGEST:g}, but the largest is {np.abs(points).max():g}")
+    row = int(np.flatnonzero(bad)[0])
+    raise ArgumentError(f"{name} must be finite, but {int(bad.sum())} rows are not, first row {row}: {points[row]}")
+
+
+def _check_distinct(points: NDArray[Any], name: str) -> None:
+    """At least 3 distinct points; the first thousand nearly always hold them."""
+    for part in (points[:1000], points):
+        others = part[(part != part[:1]).any(axis=1)]
+        if len(others) and (others != others[0]).any():
+            return
+    distinct = len(np.unique(points, axis=0))
+    raise ArgumentError(f"{name} must hold at least 3 distinct points, but holds {distinct} among {len(points)} rows")
+
+
+def _warn_of_lost_precision(points: NDArray[Any], name: str, largest: float, extent: float) -> None:
+    """float32 at UTM size has steps of half a metre: nothing can bring back what it lost."""
+    step = largest * float(np.finfo(np.float32).eps)
+    if points.dtype == np.float32 and step > 1e-4 * extent:
+        warnings.warn(
+            f"{name} is float32 with coordinates up to {largest:.3g}: they are rounded to {step:.2g} over an extent of "
+            f"{extent:.3g}; give float64 coordinates, or subtract an offset before rounding",
+            stacklevel=2,
+        )

@@ -1,0 +1,35 @@
+"""Every exception that fieldalign raises on purpose.
+
+    FieldalignError
+    ├── ArgumentError (ValueError)       an argument has the wrong shape, value or combination
+    │   ├── CloudFileError               a file is missing, truncated, foreign or promises what it does not hold
+    │   └── FieldError                   a distance field answered with the wrong shape or with values that are not finite
+    └── MissingExtraError (ImportError)  an optional dependency is not installed; the message names the extra
+
+Each message is one sentence that names the argument, says what came and what is allowed.
+"""
+
+
+class FieldalignError(Exception):
+    """Root of all exceptions of fieldalign."""
+
+
+class ArgumentError(FieldalignError, ValueError):
+    """An argument has the wrong shape, value or combination."""
+
+
+class CloudFileError(ArgumentError):
+    """A file is missing, truncated, foreign or promises what it does not hold."""
+
+
+class FieldError(ArgumentError):
+    """A distance field answered with the wrong shape or with values that are not finite."""
+
+
+class MissingExtraError(FieldalignError, ImportError):
+    """An optional dependency is not installed; the message names the extra that brings it."""
+
+
+def missing_extra(extra: str, purpose: str) -> MissingExtraError:
+    """The error for an absent optional dependency: what it is needed for, and the command that brings it."""
+    return MissingExtraError(f"{purpose} needs the extra '{extra}': pip install 'fieldalign[{extra}]'")

@@ -1,0 +1,99 @@
+"""What a distance field is: anything that says, for places in space, how far its surface is and where."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FieldError
+
+Floats = NDArray[np.float64]
+
+
+class FieldSample:
+    """What a field says at L places.
+
+    value: (L,), distance to the surface, in the cloud's unit; negative inside where the field is signed.
+    gradient: (L, 3), the value's derivative; zero where it has none (on an unsigned surface itself).
+    foot: (L, 3), place - value * gradient: the nearest place on the surface.
+    normal: (L, 3), the surface's unit normal at the foot; its sign means something only where the field is signed.
+
+    place: (L,), where the field itself keeps each foot; a guess for its next sample nearby. None: it keeps no such thing.
+
+    `normal` may be given as a function without arguments; it is then worked out when first asked for, since few need
+    it. A sample unpacks into the four arrays in this order.
+    """
+
+    def __init__(
+        self,
+        value: Floats,
+        gradient: Floats,
+        foot: Floats,
+        normal: Floats | Callable[[], Floats],
+        place: NDArray[np.uint32] | None = None,
+    ) -> None:
+        self.value = value
+        self.gradient = gradient
+        self.foot = foot
+        self.place = place
+        self._normal = normal
+
+    @property
+    def normal(self) -> Floats:
+        """Unit normals at the feet, (L, 3)."""
+        if callable(self._normal):
+            self._normal = self._normal()
+        return self._normal
+
+    def __iter__(self) -> Iterator[Floats]:
+        return iter((self.value, self.gradient, self.foot, self.normal))
+
+
+@runtime_checkable
+class DistanceField(Protocol):
+    """A surface, known by the distance to it; anything with these members is one.
+
+    signed: whether `value` is negative on one side. If one field of a pair is unsigned, both are taken so.
+    bounds: (2, 3), the lowest and the highest corner of a box around the surface, in the cloud's unit.
+    """
+
+    signed: bool
+
+    @property
+    def bounds(self) -> Floats:
+        """The lowest and the highest corner of a box around the surface, (2, 3)."""
+        ...
+
+    def sample(self, x: Floats) -> FieldSample | tuple[Floats, Floats, Floats, Floats]:
+        """value (L,), gradient (L, 3), foot (L, 3) and normal (L, 3) at the places x (L, 3)."""
+        ...
+
+
+def sampled(field: DistanceField, x: Floats, last: FieldSample | None = None) -> FieldSample:
+    """A field at the places x (L, 3), as a FieldSample; raises FieldError where a foreign field answers nonsense.
+
+    last: the field's own sample of the same points a little earlier; those that keep a `place` can start from it.
+    """
+    if last is None or last.place is None:
+        answer = field.sample(x)
+    else:
+        answer = field.sample(x, guess=last.place)  # type: ignore[call-arg]
+    sample = answer if isinstance(answer, FieldSample) else FieldSample(*_four(field, answer))
+    for name, shape in (("value", (len(x),)), ("gradient", x.shape), ("foot", x.shape)):
+        got = np.shape(getattr(sample, name))
+        if got != shape:
+            raise FieldError(f"{type(field).__name__}.sample must give a {name} of shape {shape}, but gave {got}")
+    if not np.isfinite(sample.value.sum() + sample.gradient.sum()):
+        raise FieldError(f"{type(field).__name__}.sample must give finite values and gradients, but gave NaN or infinity")
+    return sample
+
+
+def _four(field: DistanceField, answer: object) -> tuple[Floats, Floats, Floats, Floats]:
+    try:
+        value, gradient, foot, normal = answer  # type: ignore[misc]
+    except (TypeError, ValueError) as error:
+        raise FieldError(f"{type(field).__name__}.sample must give value, gradient, foot and normal") from error
+    return tuple(np.asarray(part, float) for part in (value, gradient, foot, normal))  # type: ignore[return-value]

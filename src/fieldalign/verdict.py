@@ -1,0 +1,86 @@
+"""What can be said of a pose: how much of the clouds agrees, how well it is determined, whether to accept it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .alignment import Alignment
+from .alignment.residual import cross, row_dot
+from .fields import FieldSample, sampled
+from .fields.protocol import Floats
+from .motions import apply, inverse
+from .prepared import PreparedCloud
+from .result import Reason
+from .settings import Settings
+
+STILL = 1e-3  # of the extent: a last increment that moves some point further has not converged
+
+
+@dataclass(frozen=True, eq=False)
+class Certainty:
+    """Information (6, 6), its pseudo-inverse, the basis (6, k) of what it says nothing about, and the point (3,) it holds for."""
+
+    information: Floats
+    covariance: Floats
+    unobservable: Floats
+    reference_point: Floats
+
+
+def judge(alignment: Alignment, source: PreparedCloud) -> Reason:
+    """Whether enough pseudo points remain and the last increment moves no point of the source far."""
+    w, v = np.split(alignment.steps[-1].increment, 2)
+    moves = np.linalg.norm(w) * source.extent / 2 + np.linalg.norm(v)
+    if not alignment.strict:
+        return Reason.LOW_OVERLAP
+    return Reason.NOT_CONVERGED if moves > STILL * source.extent else Reason.ACCEPTED
+
+
+def overlaps(source: PreparedCloud, target: PreparedCloud, T_target_source: Floats) -> tuple[float, float]:
+    """Share of the source's surface that lies on the target's, and of the target's that lies on the source's."""
+    near = source.probes[1] + target.probes[1] or STILL * min(source.extent, target.extent)
+
+    def share(of: PreparedCloud, on: PreparedCloud, T: Floats) -> float:
+        distances = sampled(on.field, apply(T, of.probes[0])).value
+        return float((np.abs(distances) <= near).mean())
+
+    return share(source, target, T_target_source), share(target, source, inverse(T_target_source))
+
+
+def rmse(at_source: FieldSample, at_target: FieldSample, alignment: Alignment) -> float:
+    """Root mean square difference of the two distances at the kept pseudo points, in the cloud's unit."""
+    off = (np.abs(at_source.value) - np.abs(at_target.value))[alignment.kept]
+    return float(np.sqrt(np.mean(off**2)))
+
+
+def certainty(at_source: FieldSample, pseudo: Floats, alignment: Alignment, r: Floats, settings: Settings) -> Certainty:
+    """Information of a left perturbation (w, v) in the target frame, from the residuals' own spread.
+
+    Gauss-Newton's J^T W J / s^2 over the kept pseudo points, with s^2 = sum w r^2 / (n - 6), as if they were independent.
+    """
+    kept = alignment.kept
+    reference = pseudo[kept].mean(axis=0)
+    R = alignment.T_target_source[:3, :3]
+    gradient = (2 * at_source.value[:, None] * at_source.gradient)[kept] @ R.T
+    J = np.hstack([cross(pseudo[kept] - reference, gradient), gradient])
+    w = alignment.weights[kept]
+    freedom = max(len(w) - 6, 1)
+    # Copies of one cloud agree to the last bit: a resolution of float64 stands in for their noise.
+    scale = float(np.max(at_source.value**2)) or 1.0
+    variance = max(float((w * r[kept] ** 2).sum()) / freedom, w.mean() * (1e-12 * scale) ** 2)
+    information = np.asarray((J * w[:, None]).T @ J) / variance
+    length = float(np.sqrt(row_dot(pseudo[kept] - reference, pseudo[kept] - reference).mean()))
+    return _split(information, reference, length)
+
+
+def _split(information: Floats, reference: Floats, length: float) -> Certainty:
+    """The observable part and the rest; rotations and translations are compared over a lever of `length`."""
+    scale = np.array([1, 1, 1, length, length, length])
+    values, vectors = np.linalg.eigh(information * scale[:, None] * scale)
+    seen = values > 1e-9 * values[-1]
+    known = vectors[:, seen]
+    observable = (known * values[seen]) @ known.T / scale[:, None] / scale
+    covariance = (known / values[seen]) @ known.T * scale[:, None] * scale
+    basis = np.linalg.qr(vectors[:, ~seen] * scale[:, None])[0]
+    return Certainty(observable, covariance, basis, reference)
