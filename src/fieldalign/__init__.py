@@ -4,6 +4,8 @@ import logging
 
 from . import fields
 from .clouds.cloud import PointCloud
+from .clouds.files import read_cloud, read_clouds, write_cloud
+from .clouds.thinning import thin
 from .errors import ArgumentError, CloudFileError, FieldalignError, FieldError, MissingExtraError
 from .prepared import PreparedCloud, prepare
 from .register import register
@@ -25,7 +27,11 @@ __all__ = [
     "Settings",
     "fields",
     "prepare",
+    "read_cloud",
+    "read_clouds",
     "register",
+    "thin",
+    "write_cloud",
 ]
 
 logging.getLogger(__name__).addHandler(logging.NullHandler())

@@ -6,7 +6,7 @@ import os
 from collections.abc import Hashable
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,7 +20,6 @@ from .pseudo import draw_pseudo_points, draw_surface
 from .settings import Settings
 from .threads import resolve_threads
 
-CloudLike = ArrayLike | PointCloud | DistanceField | str | os.PathLike[str] | "PreparedCloud"
 _KEPT = 8  # pseudo sets that a prepared cloud remembers
 _PROBES = 500  # surface points that stand for the whole where an overlap is measured
 
@@ -77,6 +76,9 @@ class PreparedCloud:
                 self._features.pop(next(iter(self._features)), None)
             self._features[key] = pseudo, sampled(field, pseudo)
         return self._features[key]
+
+
+CloudLike: TypeAlias = ArrayLike | PointCloud | DistanceField | str | os.PathLike[str] | PreparedCloud
 
 
 def prepare(cloud: CloudLike, *, threads: int | None = None, drop_nonfinite: bool = True) -> PreparedCloud:

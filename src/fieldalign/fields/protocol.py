@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,9 +91,8 @@ def sampled(field: DistanceField, x: Floats, last: FieldSample | None = None) ->
     return sample
 
 
-def _four(field: DistanceField, answer: object) -> tuple[Floats, Floats, Floats, Floats]:
-    try:
-        value, gradient, foot, normal = answer  # type: ignore[misc]
-    except (TypeError, ValueError) as error:
-        raise FieldError(f"{type(field).__name__}.sample must give value, gradient, foot and normal") from error
-    return tuple(np.asarray(part, float) for part in (value, gradient, foot, normal))  # type: ignore[return-value]
+def _four(field: DistanceField, answer: Any) -> list[Floats]:
+    parts = list(answer) if isinstance(answer, tuple | list) else []
+    if len(parts) != 4:
+        raise FieldError(f"{type(field).__name__}.sample must give value, gradient, foot and normal, but gave {answer!r}")
+    return [np.asarray(part, float) for part in parts]

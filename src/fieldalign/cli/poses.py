@@ -1,0 +1,36 @@
+"""Poses as people write them on a command line."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import ArgumentError
+from ..motions import Matrix, as_rigid
+
+
+def read_pose(text: str) -> Matrix:
+    """A rigid motion (4, 4) from a file (.npy, .json, or text of 4 rows) or from 16 numbers, row by row.
+
+    A .json file holds 4 rows, or an object with the key T_target_source, as `--json` writes it.
+    Raises ArgumentError where it is none.
+    """
+    try:
+        values = _from_file(Path(text)) if Path(text).is_file() else np.array(text.replace(",", " ").split(), float)
+    except (OSError, ValueError) as error:
+        raise ArgumentError(f"init must be a file with a 4 x 4 pose or 16 numbers, but is {text!r}: {error}") from error
+    if np.size(values) != 16:
+        raise ArgumentError(f"init must hold 16 numbers (4 x 4, row by row), but {text!r} holds {np.size(values)}")
+    return as_rigid(np.reshape(values, (4, 4)), "init")
+
+
+def _from_file(path: Path) -> Any:
+    if path.suffix == ".npy":
+        return np.load(path, allow_pickle=False)
+    if path.suffix == ".json":
+        content = json.loads(path.read_text())
+        return content.get("T_target_source", content) if isinstance(content, dict) else content
+    return np.loadtxt(path)

@@ -1,0 +1,78 @@
+"""Two clouds painted into an image: the nearer points over the farther ones, whichever cloud they belong to.
+
+Painting with numpy takes a fourth of the time of a scatter plot and hides no cloud behind the other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Image = NDArray[np.uint8]
+Clouds = tuple[Array, Array]  # source and target, each (N, 3), in one frame
+
+# Vermillion and blue of Okabe and Ito: told apart by every kind of colour vision.
+SOURCE_COLOR = (0.835, 0.369, 0.0)
+TARGET_COLOR = (0.0, 0.447, 0.698)
+
+_FADE = 0.55  # how far towards white the farthest points go: a cloud of one colour looks flat without
+_COVERED = 0.6  # share of the image that the points' discs would cover, side by side
+_SMALLEST, _LARGEST = 1.5, 9  # radius of such a disc in pixels
+
+
+@dataclass(frozen=True)
+class Window:
+    """The part of a view's plane that is painted: its middle, width and height, in the clouds' unit."""
+
+    middle: Array
+    width: float
+    height: float
+
+
+def window_of(clouds: Clouds, view: Array) -> Window:
+    """The window that holds all but a few strays of the clouds, with a margin."""
+    seen = np.concatenate(clouds) @ view[:2].T
+    low, high = np.percentile(seen, (0.1, 99.9), axis=0)
+    nothing = 1e-9 * float(np.abs(seen).max()) + 1e-300  # a width for clouds that are seen as a line
+    width, height = 1.08 * np.maximum(high - low, nothing)
+    return Window((low + high) / 2, float(width), float(height))
+
+
+def paint(clouds: Clouds, view: Array, window: Window, columns: int) -> Image:
+    """The image (rows, columns, 4) of the window, RGBA, white where there is nothing."""
+    scale = columns / window.width
+    rows = round(window.height * scale)
+    seen = np.concatenate(clouds) @ view.T
+    x, y = (seen[:, :2] - window.middle).T * scale
+    column, row = np.floor(columns / 2 + x), np.floor(rows / 2 - y)
+    inside = (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
+    nearer_last = np.argsort(seen[:, 2], kind="stable")
+    nearer_last = nearer_last[inside[nearer_last]]
+
+    margin = int(_LARGEST)  # so that a disc at the edge needs no test
+    canvas = np.full((rows + 2 * margin, columns + 2 * margin), 2**32 - 1, np.uint32)
+    wide = canvas.shape[1]
+    middles = ((row + margin) * wide + column + margin)[nearer_last].astype(np.int64)
+    pixels = middles[:, None] + _disc(len(seen), rows * columns) @ (1, wide)
+    canvas.ravel()[pixels] = _shaded(clouds, seen[:, 2])[nearer_last, None]  # of equal pixels the last one stays
+    return canvas[margin:-margin, margin:-margin].copy().view(np.uint8).reshape(rows, columns, 4)
+
+
+def _shaded(clouds: Clouds, depth: Array) -> NDArray[np.uint32]:
+    """Each point's colour, its four bytes as one number; paler the farther it is."""
+    colors = np.repeat([(*SOURCE_COLOR, 1.0), (*TARGET_COLOR, 1.0)], [len(cloud) for cloud in clouds], axis=0)
+    far, near = np.percentile(depth, (2, 98))
+    fade = _FADE * np.clip((near - depth) / max(near - far, 1e-300), 0, 1)[:, None]
+    bytes_of_each = (255 * (colors * (1 - fade) + fade)).astype(np.uint8)
+    return np.asarray(bytes_of_each.view(np.uint32)).ravel()
+
+
+def _disc(points: int, pixels: int) -> NDArray[np.int64]:
+    """The offsets (M, 2) of one point's pixels: more for few points, so that they look like a surface."""
+    radius = np.clip(np.sqrt(_COVERED * pixels / (np.pi * points)), _SMALLEST, _LARGEST)
+    reach = np.arange(-int(radius), int(radius) + 1)
+    offsets = np.stack(np.meshgrid(reach, reach), axis=-1).reshape(-1, 2)
+    return np.asarray(offsets[np.sum(offsets**2, axis=1) <= radius**2])

@@ -1,0 +1,54 @@
+import numpy as np
+import pytest
+from scipy.spatial.transform import RigidTransform
+
+from fieldalign.errors import ArgumentError
+from fieldalign.motions import apply, as_rigid, exp_twist, inverse, nearest_rotation, translation
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-7, 9.9e-5, 1.01e-4, 1e-2, 1.0, 3.1, np.pi, 5.0])
+def test_exp_agrees_with_scipy(rng, angle):
+    w = rng.normal(size=3)
+    twist = np.r_[angle * w / np.linalg.norm(w), rng.normal(size=3)]
+    assert np.allclose(exp_twist(twist), RigidTransform.from_exp_coords(twist).as_matrix(), atol=4e-15, rtol=0)
+
+
+def test_inverse_undoes(rng):
+    T = exp_twist(rng.normal(size=6))
+    assert np.allclose(inverse(T) @ T, np.eye(4), atol=1e-15)
+
+
+def test_apply_moves_points(rng):
+    T, points = exp_twist(rng.normal(size=6)), rng.normal(size=(50, 3))
+    assert np.allclose(apply(T, points), points @ T[:3, :3].T + T[:3, 3], atol=1e-15)
+    assert np.array_equal(apply(translation([1, 2, 3]), np.zeros((1, 3))), [[1, 2, 3]])
+
+
+def test_nearest_rotation_cleans_rounding(rng):
+    R = exp_twist(rng.normal(size=6))[:3, :3]
+    cleaned = nearest_rotation(R + 1e-6 * rng.normal(size=(3, 3)))
+    assert np.allclose(cleaned @ cleaned.T, np.eye(3), atol=1e-15)
+    assert np.abs(cleaned - R).max() < 1e-5
+
+
+def test_as_rigid_cleans_a_pose_with_few_digits(rng):
+    T = exp_twist(rng.normal(size=6))
+    cleaned = as_rigid(np.round(T, 5), "init")
+    assert np.allclose(cleaned[:3, :3] @ cleaned[:3, :3].T, np.eye(3), atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("pose", "word"),
+    [
+        (np.eye(3), "shape"),
+        (np.diag([1, 1, -1, 1]), "rotation"),
+        (np.diag([2, 2, 2, 1]), "rotation"),
+        (np.zeros((4, 4)), "row"),
+        (np.full((4, 4), np.nan), "finite"),
+        ("pose", "numbers"),
+        ([[1, 2], [3]], "numbers"),
+    ],
+)
+def test_as_rigid_refuses_what_is_no_motion(pose, word):
+    with pytest.raises(ArgumentError, match=f"init.*{word}"):
+        as_rigid(pose, "init")
