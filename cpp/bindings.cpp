@@ -6,8 +6,10 @@
 
 #include "keypoints.hpp"
 #include "least_squares.hpp"
+#include "multiplicity.hpp"
 #include "point_field.hpp"
 #include "point_tree.hpp"
+#include "rows.hpp"
 #include "surfels.hpp"
 #include "thinning.hpp"
 
@@ -19,6 +21,8 @@ namespace {
 
 template <class Real>
 using Points = nb::ndarray<const Real, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+template <int n>
+using Square = nb::ndarray<const double, nb::shape<n, n>, nb::c_contig, nb::device::cpu>;
 using Rows6 = nb::ndarray<const double, nb::shape<-1, 6>, nb::c_contig, nb::device::cpu>;
 using Places = nb::ndarray<const std::uint32_t, nb::shape<-1>, nb::c_contig, nb::device::cpu>;
 using Values = nb::ndarray<const double, nb::shape<-1>, nb::c_contig, nb::device::cpu>;
@@ -99,6 +103,7 @@ nb::tuple sample(const PointTree& tree, Points<double> queries, int k, std::opti
     parallel_blocks(n, 128, threads, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
         const Vec3 query = view(queries)[i] - tree.centre();
+        if (!guess && i > begin) place[i] = place[i - 1];  // queries in a row often lie near each other
         const FieldSample s = k == 1 ? nearest_point_field(tree, query, place[i]) : mean_point_field(tree, query, k);
         const Vec3 at = s.foot + tree.centre();
         value[i] = s.value;
@@ -147,17 +152,65 @@ auto thin_points(Points<Real> points, Points<double> bounds, double voxel, int t
   return std::make_pair(array(std::move(means), {n, 3}), array(std::move(thinned.first), {n}));
 }
 
-auto weighted_normal_equations(Rows6 J, Values r, Values w) {
-  if (r.shape(0) != J.shape(0) || w.shape(0) != J.shape(0)) throw std::invalid_argument("J, r and w differ in length");
-  const NormalEquations sums = normal_equations(J.data(), r.data(), w.data(), J.shape(0));
-  return std::make_pair(array(std::vector<double>(sums.H.begin(), sums.H.end()), {6, 6}),
-                        array(std::vector<double>(sums.g.begin(), sums.g.end()), {6}));
+Array<double> transform_points(Square<3> R, Values t, Points<double> points) {
+  if (t.shape(0) != 3) throw std::invalid_argument("t must have three entries");
+  std::vector<double> moved(points.shape(0) * 3);
+  transform(R.data(), t.data(), points.data(), points.shape(0), moved.data());
+  return array(std::move(moved), {points.shape(0), 3});
+}
+
+Array<double> moments(Points<double> x, Points<double> g) {
+  if (x.shape(0) != g.shape(0)) throw std::invalid_argument("x and g differ in length");
+  std::vector<double> rows(x.shape(0) * 6);
+  moment_rows(x.data(), g.data(), x.shape(0), rows.data());
+  return array(std::move(rows), {x.shape(0), 6});
+}
+
+void check_rows(std::size_t n, std::initializer_list<std::size_t> others) {
+  for (const std::size_t other : others)
+    if (other != n) throw std::invalid_argument("J, r and w differ in length");
+}
+
+Array<double> array(const Twist& x) { return array(std::vector<double>(x.begin(), x.end()), {6}); }
+
+Array<double> direct(Rows6 J, Values r) {
+  check_rows(J.shape(0), {r.shape(0)});
+  const std::vector<double> ones(J.shape(0), 1);
+  return array(solve(normal_equations(J.data(), r.data(), ones.data(), J.shape(0))));
+}
+
+auto reweighted(Rows6 J, Values r, Values w, double floor, double unit, double tolerance, int steps) {
+  check_rows(J.shape(0), {r.shape(0), w.shape(0)});
+  std::vector<double> weights(w.data(), w.data() + w.shape(0));
+  Twist x;
+  {
+    nb::gil_scoped_release free;
+    x = reweighted_solution(J.data(), r.data(), weights.data(), J.shape(0), {floor, unit, tolerance, steps});
+  }
+  return std::make_pair(array(x), array(std::move(weights), {w.shape(0)}));
+}
+
+Array<double> information(Rows6 J, Values w) {
+  check_rows(J.shape(0), {w.shape(0)});
+  const std::vector<double> zeros(J.shape(0), 0);
+  const Square6 H = normal_equations(J.data(), zeros.data(), w.data(), J.shape(0)).H;
+  std::vector<double> rows;
+  for (const Twist& row : H) rows.insert(rows.end(), row.begin(), row.end());
+  return array(std::move(rows), {6, 6});
 }
 
 Array<std::int64_t> count_equal(Points<double> points) {
-  std::vector<std::int64_t> counts(points.shape(0));
-  multiplicity(points.data(), points.shape(0), counts.data());
-  return array(std::move(counts), {points.shape(0)});
+  return array(multiplicity(points.data(), points.shape(0)), {points.shape(0)});
+}
+
+Array<std::uint32_t> rows_along_curve(const PointTree& tree, Places places) {
+  std::vector<std::uint32_t> rows(places.shape(0));
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    if (places.data()[i] >= tree.size()) throw std::invalid_argument("the tree has no such place");
+    rows[i] = tree.row(places.data()[i]);
+  }
+  const std::size_t n = rows.size();
+  return array(std::move(rows), {n});
 }
 
 constexpr const char* kSurveyDoc =
@@ -179,6 +232,7 @@ NB_MODULE(_core, m) {
            "points; a place of an earlier sample, given as a guess, changes nothing but the time.")
       .def("normals", &normals, "queries"_a, "neighbours"_a, "threads"_a,
            "Unit normals (n, 3) of the planes through the k nearest points.")
+      .def("rows", &rows_along_curve, "places"_a, "Rows (n,) of places (n,) along the tree's curve.")
       .def("keypoints", &keypoints, "salient_radius"_a, "non_max_radius"_a, "gamma_21"_a, "gamma_32"_a,
            "min_neighbours"_a, "threads"_a, "Rows of the ISS keypoints, ascending.");
   m.def("survey", &survey_points<float>, "points"_a.noconvert(), "threads"_a, kSurveyDoc);
@@ -187,7 +241,11 @@ NB_MODULE(_core, m) {
         kThinDoc);
   m.def("thin", &thin_points<double>, "points"_a.noconvert(), "bounds"_a, "voxel"_a, "threads"_a,
         kThinDoc);
-  m.def("normal_equations", &weighted_normal_equations, "J"_a, "r"_a, "w"_a,
-        "H = sum w J^T J (6, 6) and g = sum w J^T r (6,), over rows (n, 6), (n,), (n,).");
+  m.def("transform", &transform_points, "R"_a, "t"_a, "points"_a, "R (3, 3) times each of points (n, 3), plus t (3,).");
+  m.def("moment_rows", &moments, "x"_a, "g"_a, "Rows (n, 6) of x cross g, then g, of x and g (n, 3).");
+  m.def("direct", &direct, "J"_a, "r"_a, "The twist (6,) that minimises |J x + r|^2 over rows (n, 6), (n,).");
+  m.def("reweighted", &reweighted, "J"_a, "r"_a, "w"_a, "floor"_a, "unit"_a, "tolerance"_a, "steps"_a,
+        "The twist (6,) that minimises sum |J x + r|, and the weights (n,) it ends with.");
+  m.def("information", &information, "J"_a, "w"_a, "sum w J^T J (6, 6), over rows (n, 6), (n,).");
   m.def("count_equal", &count_equal, "points"_a, "For each point (n, 3), how many of them equal it.");
 }

@@ -7,6 +7,7 @@
 // of UTM size lose nothing.
 #pragma once
 
+#include <array>
 #include <bit>
 #include <stdexcept>
 
@@ -34,7 +35,7 @@ class PointTree {
 
  private:
   static constexpr int kFan = 4;                // halves of halves
-  static constexpr std::size_t kLeaf = 12;      // the most points of a leaf, but for points that are all equal
+  static constexpr std::size_t kLeaf = 32;      // the most points of a leaf, but for points that are all equal
   static constexpr std::size_t kTwig = 16384;   // the most points of a subtree that one thread grows
   static constexpr int kDeepest = 48;           // levels: details of 1e-9 of the extent, and what is finer is a leaf
 
@@ -51,8 +52,9 @@ class PointTree {
   struct Split {
     Range range;
     int depth;
-    std::vector<Range> parts;  // one part: it could not be parted, or need not
-    bool is_parted() const { return parts.size() > 1; }
+    int parts;  // one: it could not be parted, or need not
+    std::array<Range, kFan> part;
+    bool is_parted() const { return parts > 1; }
   };
   // What grew from a range: a leaf, or the first of the nodes that were appended.
   struct Grown {
@@ -71,7 +73,7 @@ class PointTree {
   static void split_to_twigs(PointsView<Real> points, std::span<Placed> order, Range range, int depth, int threads,
                              std::vector<Split>& splits);
   template <class Grow>
-  Grown join(std::vector<Node>& nodes, const std::vector<Range>& parts, Grow grow) const;
+  Grown join(std::vector<Node>& nodes, const Split& split, Grow grow) const;
   template <class Real>
   Grown grow(PointsView<Real> points, std::span<Placed> order, Range range, int depth, std::vector<Node>& nodes);
   template <class Real>
@@ -136,16 +138,16 @@ std::size_t middle_of(PointsView<Real> points, std::span<Placed> order, std::siz
 template <class Real>
 PointTree::Split PointTree::split(PointsView<Real> points, std::span<Placed> order, Range range, std::size_t most,
                                   int depth, int threads) {
-  Split result{range, depth, {range}};
+  Split result{range, depth, 1, {range}};
   for (int round = 0; round < 2 && depth < kDeepest; ++round) {
-    std::vector<Range> halves;
-    for (const Range part : result.parts) {
-      const std::size_t middle =
-          part.size() > most ? middle_of(points, order, part.begin, part.end, threads) : part.begin;
-      if (middle != part.begin) halves.push_back({part.begin, middle});
-      halves.push_back({middle, part.end});
+    const Split before = result;
+    result.parts = 0;
+    for (int k = 0; k < before.parts; ++k) {
+      const auto [begin, end] = before.part[k];
+      const std::size_t middle = end - begin > most ? middle_of(points, order, begin, end, threads) : begin;
+      if (middle != begin) result.part[result.parts++] = {begin, middle};
+      result.part[result.parts++] = {middle, end};
     }
-    result.parts = std::move(halves);
   }
   return result;
 }
@@ -157,22 +159,22 @@ void PointTree::split_to_twigs(PointsView<Real> points, std::span<Placed> order,
   const Split parted = split(points, order, range, kTwig, depth, threads);
   splits.push_back(parted);
   if (!parted.is_parted()) return;
-  for (const Range part : parted.parts) split_to_twigs(points, order, part, depth + 1, threads, splits);
+  for (int k = 0; k < parted.parts; ++k) split_to_twigs(points, order, parted.part[k], depth + 1, threads, splits);
 }
 
-// Appends a node over the parts, and behind it what `grow` appends for each.
+// Appends a node over the parts of a split, and behind it what `grow` appends for each.
 template <class Grow>
-PointTree::Grown PointTree::join(std::vector<Node>& nodes, const std::vector<Range>& parts, Grow grow) const {
+PointTree::Grown PointTree::join(std::vector<Node>& nodes, const Split& split, Grow grow) const {
   const std::size_t self = nodes.size();
   nodes.push_back({});
   Bounds all;
-  for (std::size_t k = 0; k < kFan; ++k) {
-    const bool there = k < parts.size();
+  for (int k = 0; k < kFan; ++k) {
+    const bool there = k < split.parts;
     const auto place = static_cast<std::uint32_t>(nodes.size() - self);
-    const Grown child = there ? grow(parts[k]) : Grown{};  // a child that is not there is infinitely far from anywhere
+    const Grown child = there ? grow(split.part[k]) : Grown{};  // a child that is not there is infinitely far from anywhere
     Node& node = nodes[self];
     node.count[k] = child.leaf_points;
-    node.child[k] = there && child.leaf_points ? static_cast<std::uint32_t>(parts[k].begin) : place;
+    node.child[k] = there && child.leaf_points ? static_cast<std::uint32_t>(split.part[k].begin) : place;
     for (int axis = 0; axis < 3; ++axis) {
       node.lo[axis][k] = static_cast<float>(child.bounds.lo[axis] / unit_);
       node.hi[axis][k] = static_cast<float>(child.bounds.hi[axis] / unit_);
@@ -187,7 +189,7 @@ PointTree::Grown PointTree::grow(PointsView<Real> points, std::span<Placed> orde
                                  std::vector<Node>& nodes) {
   const Split parted = split(points, order, range, kLeaf, depth, 1);
   if (!parted.is_parted()) return fill_leaf(points, order, range);
-  return join(nodes, parted.parts, [&](Range part) { return grow(points, order, part, depth + 1, nodes); });
+  return join(nodes, parted, [&](Range part) { return grow(points, order, part, depth + 1, nodes); });
 }
 
 template <class Real>
@@ -228,11 +230,11 @@ PointTree::PointTree(PointsView<Real> points, int threads) : points_(points.n), 
   std::size_t next = 0;
   const auto gather = [&](const auto& self) -> Grown {
     const std::size_t i = next++;
-    if (splits[i].is_parted()) return join(nodes_, splits[i].parts, [&](Range) { return self(self); });
+    if (splits[i].is_parted()) return join(nodes_, splits[i], [&](Range) { return self(self); });
     nodes_.insert(nodes_.end(), twigs[i].nodes.begin(), twigs[i].nodes.end());
     return twigs[i].root;
   };
-  join(nodes_, {whole}, [&](Range) { return gather(gather); });
+  join(nodes_, {whole, 0, 1, {whole}}, [&](Range) { return gather(gather); });
 }
 
 // ------------------------------------------------------------------------------------------------ asking

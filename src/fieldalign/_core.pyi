@@ -21,6 +21,8 @@ class PointTree:
         points; a place of an earlier sample, given as a guess, changes nothing but the time."""
     def normals(self, queries: Floats, neighbours: int, threads: int) -> Floats:
         """Unit normals (n, 3) of the planes through the k nearest points."""
+    def rows(self, places: Places) -> Places:
+        """Rows (n,) of places (n,) along the tree's curve."""
     def keypoints(
         self,
         salient_radius: float,
@@ -38,8 +40,22 @@ def survey(points: Points, threads: int) -> tuple[Floats, Floats]:
 def thin(points: Points, bounds: Floats, voxel: float, threads: int) -> tuple[Floats, NDArray[uint32]]:
     """Mean (m, 3) and first row (m,) of the points of each occupied voxel."""
 
-def normal_equations(J: Floats, r: Floats, w: Floats) -> tuple[Floats, Floats]:
-    """H = sum w J^T J (6, 6) and g = sum w J^T r (6,), over rows (n, 6), (n,), (n,)."""
+def transform(R: Floats, t: Floats, points: Floats) -> Floats:
+    """R (3, 3) times each of points (n, 3), plus t (3,)."""
+
+def moment_rows(x: Floats, g: Floats) -> Floats:
+    """Rows (n, 6) of x cross g, then g, of x and g (n, 3)."""
+
+def direct(J: Floats, r: Floats) -> Floats:
+    """The twist (6,) that minimises |J x + r|^2 over rows (n, 6), (n,)."""
+
+def reweighted(
+    J: Floats, r: Floats, w: Floats, floor: float, unit: float, tolerance: float, steps: int
+) -> tuple[Floats, Floats]:
+    """The twist (6,) that minimises sum |J x + r|, and the weights (n,) it ends with."""
+
+def information(J: Floats, w: Floats) -> Floats:
+    """sum w J^T J (6, 6), over rows (n, 6), (n,)."""
 
 def count_equal(points: Floats) -> NDArray[int64]:
     """For each point (n, 3), how many of them equal it."""

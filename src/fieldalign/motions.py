@@ -6,9 +6,12 @@ the time, so these few lines stand here, with SciPy as their oracle in the tests
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from . import _core
 from .errors import ArgumentError
 
 Matrix = NDArray[np.float64]
@@ -16,18 +19,18 @@ Matrix = NDArray[np.float64]
 
 def exp_twist(twist: Matrix) -> Matrix:
     """Exp of a twist (6,): the motion (4, 4) that it generates (Rodrigues' formula)."""
-    w, v = twist[:3], twist[3:]
-    angle = float(np.sqrt(w @ w))
-    W = np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
+    x, y, z = map(float, twist[:3])
+    angle = math.sqrt(x * x + y * y + z * z)
     if angle < 1e-4:  # the next terms of the series are below float64's resolution
         a, b, c = 1 - angle**2 / 6, 0.5 - angle**2 / 24, 1 / 6 - angle**2 / 120
     else:
-        a, b = np.sin(angle) / angle, 2 * (np.sin(angle / 2) / angle) ** 2
+        a, b = math.sin(angle) / angle, 2 * (math.sin(angle / 2) / angle) ** 2
         c = (1 - a) / angle**2
+    W = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     WW = W @ W
     T = np.eye(4)
     T[:3, :3] += a * W + b * WW
-    T[:3, 3] = v + b * (W @ v) + c * (WW @ v)
+    T[:3, 3] = (np.eye(3) + b * W + c * WW) @ twist[3:]
     return T
 
 
@@ -47,9 +50,13 @@ def translation(offset: ArrayLike) -> Matrix:
 
 
 def apply(T: Matrix, points: Matrix) -> Matrix:
-    """Points (N, 3) moved by T (4, 4); summed row by row, so that no library's choice of order changes a bit."""
-    R, t = T[:3, :3], T[:3, 3]
-    return np.stack([points[:, 0] * r[0] + points[:, 1] * r[1] + points[:, 2] * r[2] + s for r, s in zip(R, t, strict=True)], 1)
+    """Points (N, 3) moved by T (4, 4); not by a BLAS, whose order of summing may change with its threads."""
+    return _core.transform(np.ascontiguousarray(T[:3, :3]), np.ascontiguousarray(T[:3, 3]), np.ascontiguousarray(points))
+
+
+def rotate(R: Matrix, vectors: Matrix) -> Matrix:
+    """Vectors (N, 3) turned by R (3, 3)."""
+    return _core.transform(np.ascontiguousarray(R), np.zeros(3), np.ascontiguousarray(vectors))
 
 
 def nearest_rotation(R: Matrix) -> Matrix:

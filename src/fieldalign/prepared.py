@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Hashable
+from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -16,12 +17,12 @@ from .clouds.cloud import PointCloud, as_points
 from .errors import ArgumentError
 from .fields import DistanceField, FieldSample, PointField, sampled
 from .fields.protocol import Floats
-from .pseudo import draw_pseudo_points, draw_surface
+from .pseudo import draw_places, draw_pseudo_points
 from .settings import Settings
 from .threads import resolve_threads
 
 _KEPT = 8  # pseudo sets that a prepared cloud remembers
-_PROBES = 500  # surface points that stand for the whole where an overlap is measured
+_PROBES = 200  # surface points that stand for the whole where an overlap is measured
 
 
 class PreparedCloud:
@@ -51,9 +52,9 @@ class PreparedCloud:
 
     @cached_property
     def probes(self) -> tuple[Floats, float]:
-        """Places on the surface (500, 3), and within which distance another cloud's surface counts as the same."""
+        """Places on the surface (200, 3), and within which distance another cloud's surface counts as the same."""
         rng = np.random.default_rng(0)  # a sample of the cloud itself, alike for every registration
-        places, _ = draw_surface(self.field, _PROBES, rng)
+        places = draw_places(self.field, _PROBES, rng)
         if isinstance(self.field, PointField):
             return places, 3 * float(np.median(self.field.spacing(places)))
         return places, 0.0
@@ -91,6 +92,28 @@ def prepare(cloud: CloudLike, *, threads: int | None = None, drop_nonfinite: boo
     for a file that cannot be read.
     """
     return prepare_named(cloud, "cloud", threads, drop_nonfinite)
+
+
+def prepare_pair(
+    source: CloudLike, target: CloudLike, threads: int, drop_nonfinite: bool
+) -> tuple[PreparedCloud, PreparedCloud]:
+    """prepare() of both clouds of a pair, side by side: two trees of half the threads each are built sooner than one
+    after the other by all threads, which then wait for each other."""
+    if threads == 1 or _is_ready(source) or _is_ready(target):
+        return (
+            prepare_named(source, "source", threads, drop_nonfinite),
+            prepare_named(target, "target", threads, drop_nonfinite),
+        )
+    jobs = [(cloud, name, threads // 2, drop_nonfinite) for cloud, name in ((source, "source"), (target, "target"))]
+    with ThreadPoolExecutor(2) as pool:
+        moving, fixed = (pool.submit(prepare_named, *job) for job in jobs)
+        return moving.result(), fixed.result()
+
+
+def _is_ready(cloud: CloudLike) -> bool:
+    """Whether preparing it takes no time worth a thread."""
+    few = isinstance(cloud, np.ndarray) and len(cloud) < 20_000
+    return few or isinstance(cloud, PreparedCloud | DistanceField)
 
 
 def prepare_named(cloud: CloudLike, name: str, threads: int | None, drop_nonfinite: bool) -> PreparedCloud:

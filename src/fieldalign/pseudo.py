@@ -28,12 +28,15 @@ def draw_pseudo_points(target: DistanceField, centre: Floats, settings: Settings
 
 def draw_surface(field: DistanceField, count: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
     """Places (count, 3) on a field's surface, drawn with replacement, and the unit normals (count, 3) there."""
+    places = draw_places(field, count, rng)
+    return places, field.normals(places) if isinstance(field, PointField) else sampled(field, places).normal
+
+
+def draw_places(field: DistanceField, count: int, rng: np.random.Generator) -> Floats:
+    """Places (count, 3) on a field's surface, drawn with replacement: points of a cloud, else feet of places in the box."""
     if isinstance(field, PointField):
-        base = np.asarray(field.points[rng.integers(0, len(field), count)], float)
-        return base, field.normals(base)
-    low, high = field.bounds
-    sample = sampled(field, rng.uniform(low, high, (count, 3)))
-    return sample.foot, sample.normal
+        return field.drawn(count, rng)
+    return sampled(field, rng.uniform(*field.bounds, (count, 3))).foot
 
 
 def _keypoints(field: DistanceField) -> Floats:

@@ -12,9 +12,8 @@ from .alignment import align
 from .alignment.residual import residual
 from .errors import ArgumentError
 from .fields import sampled
-from .fields.protocol import Floats
 from .motions import apply, as_rigid, inverse, translation
-from .prepared import CloudLike, PreparedCloud, prepare_named
+from .prepared import CloudLike, prepare_pair
 from .result import Reason, RegistrationResult
 from .settings import Settings, as_settings
 from .threads import resolve_threads
@@ -55,8 +54,7 @@ def register(
     _refuse_what_is_missing(method, search, search_radius, search_angle, dof, scale)
     chosen, seed, threads = as_settings(settings), _as_seed(seed), resolve_threads(threads)
     clock = _Clock()
-    moving = prepare_named(source, "source", threads, drop_nonfinite)
-    fixed = prepare_named(target, "target", threads, drop_nonfinite)
+    moving, fixed = prepare_pair(source, target, threads, drop_nonfinite)
     clock.lap("prepare")
     pseudo, target_features = fixed.features(chosen, seed, threads)
     clock.lap("pseudo points")
@@ -64,7 +62,7 @@ def register(
     field = moving.sampled_by(chosen, threads)
     found = align(field, target_features, pseudo, T_start, (moving.centre, fixed.centre), chosen)
     clock.lap("align")
-    at_source = sampled(field, apply(inverse(found.T_target_source), pseudo))
+    at_source = sampled(field, apply(inverse(found.T_target_source), pseudo), found.at_source)
     reason = judge(found, moving)
     known = certainty(at_source, pseudo, found, residual(at_source, target_features), chosen)
     overlap, overlap_target = overlaps(moving, fixed, found.T_target_source)

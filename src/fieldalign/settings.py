@@ -115,10 +115,14 @@ def _at_least(name: str, value: int, lowest: int) -> None:
 
 
 PRESETS = {
-    # The paper's experiments, as the authors' program runs them where the text is silent.
-    "object": Settings("uniform", half_width=0.5, share_limit=None, direction="none", max_iterations=10),
+    # The paper's experiments: objects of about unit size, rooms and streets in metres. Where the text is silent, as the
+    # authors' program has it; it has nothing for streets, so s is ours there.
+    "object": Settings("uniform", half_width=1.0, share_limit=None, direction="none", max_iterations=10),
     "indoor": Settings("neighbourhood", half_width=2.0),
     "outdoor": Settings("keypoints", half_width=5.0),
+    # The same with the half width that the authors' program takes for ModelNet; and with more pseudo points.
+    "object-near": Settings("uniform", half_width=0.5, share_limit=None, direction="none", max_iterations=10),
+    "indoor-dense": Settings("neighbourhood", half_width=2.0, pseudo_count=3000),
 }
 
 

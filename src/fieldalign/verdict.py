@@ -6,11 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from . import _core
 from .alignment import Alignment
-from .alignment.residual import cross, row_dot
+from .alignment.residual import row_dot
 from .fields import FieldSample, sampled
 from .fields.protocol import Floats
-from .motions import apply, inverse
+from .motions import apply, inverse, rotate
 from .prepared import PreparedCloud
 from .result import Reason
 from .settings import Settings
@@ -62,14 +63,14 @@ def certainty(at_source: FieldSample, pseudo: Floats, alignment: Alignment, r: F
     kept = alignment.kept
     reference = pseudo[kept].mean(axis=0)
     R = alignment.T_target_source[:3, :3]
-    gradient = (2 * at_source.value[:, None] * at_source.gradient)[kept] @ R.T
-    J = np.hstack([cross(pseudo[kept] - reference, gradient), gradient])
+    gradient = rotate(R, (2 * at_source.value[:, None] * at_source.gradient)[kept])
+    J = _core.moment_rows(pseudo[kept] - reference, gradient)
     w = alignment.weights[kept]
     freedom = max(len(w) - 6, 1)
     # Copies of one cloud agree to the last bit: a resolution of float64 stands in for their noise.
     scale = float(np.max(at_source.value**2)) or 1.0
     variance = max(float((w * r[kept] ** 2).sum()) / freedom, w.mean() * (1e-12 * scale) ** 2)
-    information = np.asarray((J * w[:, None]).T @ J) / variance
+    information = _core.information(J, w) / variance
     length = float(np.sqrt(row_dot(pseudo[kept] - reference, pseudo[kept] - reference).mean()))
     return _split(information, reference, length)
 

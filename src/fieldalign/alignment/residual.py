@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
+from .. import _core
 from ..fields.protocol import FieldSample, Floats
 
 
@@ -18,15 +17,7 @@ def jacobian(at_source: FieldSample, x: Floats) -> Floats:
     A row is the field's gradient, 2 (x - p) (eq. 15), times the warp Jacobian [-[x]_x, I] of a moved point; J is L x 6
     and never the L x 3 x L of the text, since each feature belongs to one pseudo point.
     """
-    gradient = 2 * at_source.value[:, None] * at_source.gradient
-    return np.hstack([cross(x, gradient), gradient])
-
-
-def cross(a: Floats, b: Floats) -> Floats:
-    """Row by row cross product of (L, 3) arrays; np.cross takes three times as long."""
-    ax, ay, az = a.T
-    bx, by, bz = b.T
-    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
+    return _core.moment_rows(x, 2 * at_source.value[:, None] * at_source.gradient)
 
 
 def row_dot(a: Floats, b: Floats) -> Floats:

@@ -12,7 +12,7 @@ from ..motions import apply, exp_twist, inverse, nearest_rotation, translation
 from ..settings import Settings
 from .residual import jacobian, residual
 from .truncation import Mask, truncate
-from .weights import direct, reweighted
+from .weights import linear_step
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,10 +26,11 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Alignment:
-    """Where the loop ended: the motion, each iteration, and what the last one saw."""
+    """Where the loop ended: the motion, each iteration, and what the last one saw of the source's field."""
 
     T_target_source: Floats
     steps: tuple[Step, ...]
+    at_source: FieldSample
     kept: Mask
     strict: bool  # the kept ones passed truncation without its rules being relaxed
     weights: Floats
@@ -60,14 +61,11 @@ def align(
         r = residual(at_source, target_features)                          # eq. (11)
         kept, strict = truncate(at_source, target_features, G_inv[:3, :3], settings)  # Sec. IV-D
         J = jacobian(at_source, x)[kept]                                  # eq. (14), (15)
-        if settings.irls:
-            dx, weights[kept] = reweighted(J, r[kept], weights[kept], settings)  # Sec. IV-C
-        else:
-            dx = direct(J, r[kept])                                       # eq. (16)
+        dx, weights[kept] = linear_step(J, r[kept], weights[kept], settings)  # eq. (16), Sec. IV-C
         G_inv = exp_twist(dx) @ G_inv
         steps.append(Step(dx, float(np.abs(r[kept]).mean()), int(kept.sum())))
         if np.linalg.norm(dx / [1, 1, 1, *3 * [settings.unit]]) < settings.tolerance:
             break
     G_inv[:3, :3] = nearest_rotation(G_inv[:3, :3])
     T = in_target @ inverse(G_inv) @ inverse(in_source)
-    return Alignment(T, tuple(steps), kept, strict, weights)
+    return Alignment(T, tuple(steps), at_source, kept, strict, weights)

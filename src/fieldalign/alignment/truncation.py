@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import _core
 from ..fields.protocol import FieldSample, Floats
+from ..motions import rotate
 from ..settings import Settings
 from .residual import row_dot
 
@@ -35,7 +35,7 @@ def unshared(at_source: FieldSample, at_target: FieldSample, settings: Settings)
     """Rule 1: no foot serves more than share_limit pseudo points, in either cloud."""
     if settings.share_limit is None:
         return np.ones(len(at_source.value), bool)
-    most = np.maximum(_core.count_equal(at_source.foot), _core.count_equal(at_target.foot))
+    most = np.maximum(at_source.served, at_target.served)
     return np.asarray(most <= settings.share_limit)
 
 
@@ -45,11 +45,7 @@ def agreement(at_source: FieldSample, at_target: FieldSample, R: Floats, setting
         return np.ones(len(at_source.value))
     if settings.direction == "normals":  # the paper's words: the foot lies along the surface's normal
         return np.minimum(*(np.abs(row_dot(s.gradient, s.normal)) for s in (at_source, at_target)))
-    return row_dot(_away(at_source), _away(at_target) @ R.T)
-
-
-def _away(sample: FieldSample) -> Floats:
-    """Unit vectors away from the feet, (L, 3), the same for signed and unsigned fields; zero on the surface itself."""
-    length = np.sqrt(row_dot(sample.gradient, sample.gradient))
-    scale = np.where(length > 0, np.sign(sample.value) / np.where(length > 0, length, 1), 0)
-    return np.asarray(sample.gradient * scale[:, None])
+    # Unit vectors away from the feet, the same for signed and unsigned fields; none on a surface itself.
+    cosine = row_dot(at_source.gradient, rotate(R, at_target.gradient)) * np.sign(at_source.value * at_target.value)
+    lengths = row_dot(at_source.gradient, at_source.gradient) * row_dot(at_target.gradient, at_target.gradient)
+    return np.asarray(cosine / np.sqrt(np.where(lengths > 0, lengths, np.inf)))

@@ -69,9 +69,15 @@ class PointField:
         """Unit normals (L, 3) of the planes through the nearest points to the places x (L, 3); sign free."""
         return self._tree.normals(np.ascontiguousarray(x, float), self.normal_neighbours, self.threads)
 
+    def drawn(self, count: int, rng: np.random.Generator) -> Floats:
+        """Points (count, 3) drawn with replacement; in the order of the tree's curve, so that neighbours follow each other
+        and each finds the tree's nodes still in the cache."""
+        places = np.sort(rng.integers(0, len(self), count, dtype=np.uint32))
+        return np.asarray(self.points[self._tree.rows(places)], float)
+
     def spacing(self, x: ArrayLike) -> Floats:
         """For points x (L, 3) of the cloud, the distance (L,) to the next point that is not the same place."""
-        distances, _ = self.nearest(x, min(8, len(self)))
+        distances, _ = self.nearest(x, min(4, len(self)))
         apart = np.where(distances > 0, distances, np.inf).min(axis=1)
         return np.where(np.isfinite(apart), apart, 0.0)
 

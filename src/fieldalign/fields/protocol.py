@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import cached_property
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import _core
 from ..errors import FieldError
 
 Floats = NDArray[np.float64]
@@ -47,6 +49,11 @@ class FieldSample:
         if callable(self._normal):
             self._normal = self._normal()
         return self._normal
+
+    @cached_property
+    def served(self) -> NDArray[np.int64]:
+        """How many of the places each one's foot serves, (L,); 1 where it is its own."""
+        return _core.count_equal(np.ascontiguousarray(self.foot))
 
     def __iter__(self) -> Iterator[Floats]:
         return iter((self.value, self.gradient, self.foot, self.normal))
