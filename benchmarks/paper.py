@@ -36,9 +36,10 @@ ROWS = {
     3: (False, True, "uniform", 7.503, 12.1, 12.1),
     1: (False, False, "uniform", 7.073, 12.2, 12.4),
 }
-WITHOUT_UNIQUE_ANSWER = set(
-    ["l_sphere", "t_ico4", "t_ico4uv", "t_sphere", "t_unit_sphere", "t_torus", "t_capsule", "t_round", "t_ballA", "t_ballB", "l_halftunnel", "l_cube_40k", "l_bumpy-cube", "t_box", "t_octagonal_pocket", "t_soup"]
-)
+WITHOUT_UNIQUE_ANSWER = """
+    l_sphere t_ico4 t_ico4uv t_sphere t_unit_sphere t_torus t_capsule t_round t_ballA t_ballB l_halftunnel l_cube_40k
+    l_bumpy-cube t_box t_octagonal_pocket t_soup
+""".split()  # noqa: SIM905
 
 
 def row_settings(number: int) -> fa.Settings:
@@ -61,19 +62,17 @@ def ablation(motions: int, seeds: int) -> list[dict]:
     for density in ("thinned", "full"):
         clouds = [fa.thin(c, 0.05).points if density == "thinned" else c for c in (target, source)]
         fixed = fa.prepare(clouds[0])
-        moved = [fa.prepare(apply(P, clouds[1])) for P in moves] if density == "thinned" else None
+        moved = [fa.prepare(apply(P, clouds[1])) for P in moves]
         for name, chosen in settings.items():
-            errors = np.array([
-                [_error(_moved(moved, clouds[1], moves, i), fixed, moves[i], truth, chosen, seed) for i in range(len(moves))]
-                for seed in range(seeds)
-            ])  # (seeds, motions, 2)
+            errors = np.array(
+                [
+                    [_error(source, fixed, P, truth, chosen, seed) for source, P in zip(moved, moves, strict=True)]
+                    for seed in range(seeds)
+                ]
+            )  # (seeds, motions, 2)
             rows.append({"setting": name, "density": density, **_summary(errors)})
             print("   ", rows[-1], flush=True)
     return rows
-
-
-def _moved(prepared: list | None, source: np.ndarray, moves: np.ndarray, i: int) -> object:
-    return prepared[i] if prepared else apply(moves[i], source)
 
 
 def _error(source, target, P, truth, settings, seed) -> tuple[float, float]:
@@ -160,14 +159,16 @@ def timing(runs: int) -> list[dict]:
             fixed.features(fa.PRESETS[preset], 0, None)
             start = time.perf_counter()
             result = fa.register(source, fixed, settings=preset)
-            samples.setdefault((name, None, "target prepared"), []).append((time.perf_counter() - start, result.seconds))
+            taken = time.perf_counter() - start, result.seconds
+            samples.setdefault((name, None, "target prepared"), []).append(taken)
     rows = []
     for (name, threads, what), taken in samples.items():
         stages = {s: round(1e3 * float(np.median([t[1][s] for t in taken])), 2) for s in taken[0][1]}
         total = 1e3 * np.array([t[0] for t in taken])
         rows.append({
             "case": name, "from": what, "threads": threads or "all", "median_ms": float(np.median(total)),
-            "min_ms": float(total.min()), "stages_ms": stages, "target_ms": cases[name][3], "reference_ms": cases[name][4],
+            "min_ms": float(total.min()), "stages_ms": stages,
+            "target_ms": cases[name][3], "reference_ms": cases[name][4],
         })
         print("   ", rows[-1], flush=True)
     return rows
@@ -208,19 +209,21 @@ def _room(n: int) -> np.ndarray:
 
 def as_markdown(results: dict) -> str:
     lines = [f"Measured with fieldalign {fa.__version__} on {results['machine']}, {results['date']}.", ""]
-    lines += ["| # | IRLS | truncation | pseudo set | density | median deg (by seed) | median m | <5 deg, 20 cm | <1 deg, 5 cm "
-              "| program, this pair | paper, 3DMatch |", "| --- |" + " --- |" * 10]
+    lines += ["| # | IRLS | truncation | pseudo set | density | median deg (by seed) | median m | <5 deg, 20 cm "
+              "| <1 deg, 5 cm | program, this pair | paper, 3DMatch |", "| --- |" + " --- |" * 10]
     for row in results["ablation"]:
         number = int(row["setting"].split()[1]) if row["setting"].startswith("row") else None
         irls, truncation, pseudo_set, paper, thinned, full = ROWS.get(number, (True, True, "neighbourhood", "", "", ""))
         program = thinned if row["density"] == "thinned" else full
         low, high = min(row["median_deg_by_seed"]), max(row["median_deg_by_seed"])
         lines.append(
-            f"| {number or row['setting']} | {'yes' if irls else 'no'} | {'yes' if truncation else 'no'} | {pseudo_set} | "
+            f"| {number or row['setting']} | {'yes' if irls else 'no'} | {'yes' if truncation else 'no'} "
+            f"| {pseudo_set} | "
             f"{row['density']} | {row['median_deg']:.2f} ({low:.2f}-{high:.2f}) | {row['median_m']:.3f} | "
             f"{row['success_5deg_20cm']:.2f} | {row['success_1deg_5cm']:.2f} | {program} | {paper} |"
         )
-    lines += ["", "| set | preset | twists | runs | share below 1e-3 deg | median deg | RMSE deg |", "| --- |" + " --- |" * 6]
+    lines += ["", "| set | preset | twists | runs | share below 1e-3 deg | median deg | RMSE deg |"]
+    lines += ["| --- |" + " --- |" * 6]
     for row in results["objects"]:
         lines.append(
             f"| {row['set']} | {row['preset']} | {row['twists']} | {row['runs']} | {row['share_below_1e-3_deg']:.3f} | "
@@ -280,8 +283,8 @@ def main() -> None:
 
 def _processor() -> str:
     info = Path("/proc/cpuinfo")
-    names = [line.split(":")[1].strip() for line in info.read_text().splitlines() if "model name" in line] if info.exists() else []
-    return names[0] if names else platform.processor()
+    lines = info.read_text().splitlines() if info.exists() else []
+    return next((line.split(":")[1].strip() for line in lines if "model name" in line), platform.processor())
 
 
 if __name__ == "__main__":

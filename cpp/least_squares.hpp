@@ -89,7 +89,7 @@ inline Twist solve(const NormalEquations& sums) {
 struct Reweighting {
   double floor;      // residuals below it are weighted alike
   double unit;       // the length that counts as much as a radian in the rule for stopping
-  double tolerance;  // stop where the twist changes by less in sum
+  double tolerance;  // stop where the twist changes by less
   int steps;         // or after so many
 };
 
@@ -106,9 +106,13 @@ inline Twist reweighted_solution(const double* J, const double* r, double* w, st
       for (int a = 0; a < 6; ++a) residual += row[a] * x[a];
       w[i] = 1 / std::max(s.floor, std::abs(residual));
     }
-    double change = 0;
-    for (int a = 0; a < 6; ++a) change += std::abs(x[a] - before[a]) / (a < 3 ? 1 : s.unit);
-    if (change < s.tolerance) break;
+    // Lengths of both parts, where the authors' program sums |components|: a turned world must not stop elsewhere.
+    double turn = 0, shift = 0;
+    for (int a = 0; a < 3; ++a) {
+      turn += (x[a] - before[a]) * (x[a] - before[a]);
+      shift += (x[a + 3] - before[a + 3]) * (x[a + 3] - before[a + 3]);
+    }
+    if (std::sqrt(turn) + std::sqrt(shift) / s.unit < s.tolerance) break;
   }
   return x;
 }

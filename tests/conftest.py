@@ -34,7 +34,8 @@ def corner() -> np.ndarray:
     u, v = rng.uniform(0, 3, (2, 1500))
     walls = [np.c_[u, v, 0 * u], np.c_[u, 0 * u, 0.7 * v], np.c_[0 * u, u, 0.7 * v]]
     a, b = rng.uniform(0, 1, (2, 600))
-    box = [np.c_[1 + a, 1 + 0.6 * b, 0 * a + 0.5], np.c_[1 + a, 0 * a + 1, 0.5 * b], np.c_[0 * a + 2, 1 + 0.6 * a, 0.5 * b]]
+    top, front = np.c_[1 + a, 1 + 0.6 * b, 0 * a + 0.5], np.c_[1 + a, 0 * a + 1, 0.5 * b]
+    box = [top, front, np.c_[0 * a + 2, 1 + 0.6 * a, 0.5 * b]]
     ball = rng.normal(size=(1200, 3))
     ball = 0.4 * ball / np.linalg.norm(ball, axis=1)[:, None] + [2.3, 0.6, 1.2]
     return np.vstack([*walls, *box, ball])[rng.permutation(7500)[:6000]]

@@ -35,7 +35,7 @@ class PointTree:
         """Rows of the ISS keypoints, ascending."""
 
 def survey(points: Points, threads: int) -> tuple[Floats, Floats]:
-    """Lowest and highest corner (2, 3) and mean (3,) of points (n, 3); the mean is not finite where a coordinate is not."""
+    """Lowest and highest corner (2, 3) and mean (3,) of points (n, 3); not finite where a coordinate is not."""
 
 def thin(points: Points, bounds: Floats, voxel: float, threads: int) -> tuple[Floats, NDArray[uint32]]:
     """Mean (m, 3) and first row (m,) of the points of each occupied voxel."""

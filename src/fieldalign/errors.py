@@ -3,7 +3,7 @@
     FieldalignError
     ├── ArgumentError (ValueError)       an argument has the wrong shape, value or combination
     │   ├── CloudFileError               a file is missing, truncated, foreign or promises what it does not hold
-    │   └── FieldError                   a distance field answered with the wrong shape or with values that are not finite
+    │   └── FieldError                   a distance field answered with the wrong shape or with NaN or infinity
     └── MissingExtraError (ImportError)  an optional dependency is not installed; the message names the extra
 
 Each message is one sentence that names the argument, says what came and what is allowed.

@@ -51,7 +51,8 @@ def translation(offset: ArrayLike) -> Matrix:
 
 def apply(T: Matrix, points: Matrix) -> Matrix:
     """Points (N, 3) moved by T (4, 4); not by a BLAS, whose order of summing may change with its threads."""
-    return _core.transform(np.ascontiguousarray(T[:3, :3]), np.ascontiguousarray(T[:3, 3]), np.ascontiguousarray(points))
+    R, t = np.ascontiguousarray(T[:3, :3]), np.ascontiguousarray(T[:3, 3])
+    return _core.transform(R, t, np.ascontiguousarray(points))
 
 
 def rotate(R: Matrix, vectors: Matrix) -> Matrix:

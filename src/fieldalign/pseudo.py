@@ -33,10 +33,11 @@ def draw_surface(field: DistanceField, count: int, rng: np.random.Generator) -> 
 
 
 def draw_places(field: DistanceField, count: int, rng: np.random.Generator) -> Floats:
-    """Places (count, 3) on a field's surface, drawn with replacement: points of a cloud, else feet of places in the box."""
+    """Places (count, 3) on a field's surface, with replacement: a cloud's points, else feet of places in its box."""
     if isinstance(field, PointField):
         return field.drawn(count, rng)
-    return sampled(field, rng.uniform(*field.bounds, (count, 3))).foot
+    low, high = field.bounds
+    return sampled(field, rng.uniform(low, high, (count, 3))).foot
 
 
 def _keypoints(field: DistanceField) -> Floats:

@@ -112,4 +112,4 @@ def _refuse_what_is_missing(
     if search or radius is not None or angle is not None:
         raise ArgumentError("search is not available in this version: give a guess with init, or leave it out")
     if dof is not None or scale:
-        raise ArgumentError("dof and scale are not available in this version: all six freedoms of a rigid motion are found")
+        raise ArgumentError("dof and scale are not available in this version: a rigid motion of six freedoms is found")

@@ -42,8 +42,9 @@ class RegistrationResult:
     T_target_source: (4, 4), maps source points into the target frame.
     accepted, reason: may this pose be used, and why (not).
     overlap, overlap_target: share of the source's / the target's points with a point of the other nearby, 0 to 1.
-    information: (6, 6), twist order (w, v), a left perturbation in the target frame about reference_point, at this pose;
-        1 / (rad, unit)^2; zeros along unobservable directions. It takes pseudo points as independent: not yet calibrated.
+    information: (6, 6), twist order (w, v), a left perturbation in the target frame about reference_point, at this
+        pose; 1 / (rad, unit)^2; zeros along unobservable directions. It takes pseudo points as independent: not
+        calibrated yet.
     covariance: (6, 6), its pseudo-inverse. unobservable: (6, k), basis of the directions without information.
     reference_point: (3,), centroid of the pseudo points that were kept, in the target frame.
     alternatives: other poses that the data cannot tell from this one, each a result.

@@ -29,9 +29,9 @@ class Settings:
     The solution:
     irls: iteratively reweighted least squares for the sum of |residual| (Sec. IV-C); False: solved directly, eq. (16).
     irls_distance: residuals below the square of this distance (length) are weighted alike; keeps weights finite.
-    irls_steps, irls_tolerance: at most so many reweightings; stop where the twist changes by less in sum.
+    irls_steps, irls_tolerance: at most so many reweightings; stop where the twist changes by less.
     Truncation, tested anew in each iteration (Sec. IV-D, V-D):
-    share_limit: drop a pseudo point whose foot serves more than so many pseudo points, in either cloud; None: no such rule.
+    share_limit: drop a pseudo point whose foot serves more than so many of them, in either cloud; None: no such rule.
     direction: "feet": keep where the directions to the feet in both clouds agree, as the authors' program does;
         "normals": keep where the foot lies along the surface's normal in both clouds, as the paper's text says; "none".
     min_cosine: of the angle that the direction rule allows; lowered by 0.1 until min_kept pseudo points remain.

@@ -21,7 +21,7 @@ STILL = 1e-3  # of the extent: a last increment that moves some point further ha
 
 @dataclass(frozen=True, eq=False)
 class Certainty:
-    """Information (6, 6), its pseudo-inverse, the basis (6, k) of what it says nothing about, and the point (3,) it holds for."""
+    """Information (6, 6), its pseudo-inverse, the basis (6, k) of what it leaves open, and the point (3,) meant."""
 
     information: Floats
     covariance: Floats
@@ -58,7 +58,7 @@ def rmse(at_source: FieldSample, at_target: FieldSample, alignment: Alignment) -
 def certainty(at_source: FieldSample, pseudo: Floats, alignment: Alignment, r: Floats, settings: Settings) -> Certainty:
     """Information of a left perturbation (w, v) in the target frame, from the residuals' own spread.
 
-    Gauss-Newton's J^T W J / s^2 over the kept pseudo points, with s^2 = sum w r^2 / (n - 6), as if they were independent.
+    Gauss-Newton's J^T W J / s^2 over the kept pseudo points, s^2 = sum w r^2 / (n - 6), as if they were independent.
     """
     kept = alignment.kept
     reference = pseudo[kept].mean(axis=0)

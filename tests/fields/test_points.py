@@ -137,7 +137,8 @@ def test_keypoints_lie_at_corners_not_on_planes():
     u = np.linspace(0, 1, 41)
     a, b = (m.ravel() for m in np.meshgrid(u, u))
     faces = [np.insert(np.c_[a, b], axis, side, axis=1) for axis in range(3) for side in (0.0, 1.0)]
-    cube = np.unique(np.vstack(faces), axis=0) + 1e-4 * np.random.default_rng(0).normal(size=(9602, 3))[: len(np.unique(np.vstack(faces), axis=0))]
+    cube = np.unique(np.vstack(faces), axis=0)
+    cube += 1e-4 * np.random.default_rng(0).normal(size=cube.shape)
     found = PointField(cube).points[PointField(cube).keypoints(gamma=0.9)]
     assert len(found) >= 8
     corners = np.stack(np.meshgrid([0, 1], [0, 1], [0, 1]), axis=-1).reshape(-1, 3)

@@ -7,7 +7,7 @@ from ..fields.protocol import FieldSample, Floats
 
 
 def residual(at_source: FieldSample, at_target: FieldSample) -> Floats:
-    """phi(P_S, G^-1 P_a) - phi(P_tau, P_a), (L,): the difference of squared distances (paper eq. 11; 13 has it negated)."""
+    """phi(P_S, G^-1 P_a) - phi(P_tau, P_a), (L,): the squared distances' difference (paper eq. 11; 13 negates it)."""
     return at_source.value**2 - at_target.value**2
 
 

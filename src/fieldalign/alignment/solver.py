@@ -17,7 +17,7 @@ from .weights import linear_step
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """One iteration: its increment (6,), the mean |residual| (unit^2) and the number of pseudo points that were kept."""
+    """One iteration: its increment (6,), the mean |residual| (unit^2), how many pseudo points were kept."""
 
     increment: Floats
     cost: float
@@ -46,15 +46,15 @@ def align(
 ) -> Alignment:
     """Moves the pseudo points (L, 3) of the target's frame until both fields say the same of them.
 
-    target_features is phi(P_tau, P_a), the target's field at `pseudo`; T_start (4, 4) the first guess of T_target_source;
-    centres (3,) those of source and target, about which the increments turn.
+    target_features is phi(P_tau, P_a), the target's field at `pseudo`; T_start (4, 4) the first guess of
+    T_target_source; centres (3,) those of source and target, about which the increments turn.
     """
     in_source, in_target = translation(centres[0]), translation(centres[1])
     P_a = apply(inverse(in_target), pseudo)
     G_inv = inverse(inverse(in_target) @ T_start @ in_source)  # G^-1(xi): target -> source, both centred
-    weights = np.ones(len(pseudo))
+    weights = np.full(len(pseudo), settings.unit**-2)  # 1 in the settings' unit, so that no other unit changes a bit
     steps: list[Step] = []
-    at_source: FieldSample | None = None
+    at_source = None
     for _ in range(settings.max_iterations):
         x = apply(G_inv, P_a)                                             # G^-1(xi_) P_a
         at_source = sampled(source, x + centres[0], at_source)   # phi(P_S, G^-1(xi_) P_a), eq. (9)
@@ -68,4 +68,5 @@ def align(
             break
     G_inv[:3, :3] = nearest_rotation(G_inv[:3, :3])
     T = in_target @ inverse(G_inv) @ inverse(in_source)
+    assert at_source is not None  # at least one iteration
     return Alignment(T, tuple(steps), at_source, kept, strict, weights)

@@ -18,13 +18,13 @@ from .progress import stages
 @click.command("register")
 @click.argument("source", type=click.Path())
 @click.argument("target", type=click.Path())
-@click.option("--init", metavar="POSE", help="First guess of T_target_source: a file (.txt, .npy, .json) or 16 numbers.")
+@click.option("--init", metavar="POSE", help="First guess of T_target_source: .txt, .npy, .json, or 16 numbers.")
 @click.option("--output", type=click.Path(), help="Write the source, moved into the target's frame, to this file.")
 @click.option("--json", "json_path", type=click.Path(allow_dash=True), help="Write the result as JSON; - for stdout.")
 @click.option("--picture", type=click.Path(), help="Draw both clouds before and after (.png, .svg, .pdf).")
 @click.option("--settings", type=click.Choice(list(fa.PRESETS)), default="indoor", show_default=True)
 @click.option("--length-scale", type=float, default=1.0, show_default=True,
-              help="Multiply every length of the settings: 1000 for millimetres, 0.1 for an object of a tenth the size.")
+              help="Multiply every length of the settings: 1000 for millimetres, 0.1 for a tenth of the size.")
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of the pseudo points.")
 @click.option("--threads", type=int, default=None, help="How many threads; all cores by default.")
 def command(
@@ -41,8 +41,8 @@ def command(
 ) -> int:
     """Find the motion that brings SOURCE onto TARGET.
 
-    SOURCE and TARGET are scans in one unit: .ply, .pcd, .xyz, .txt, .csv, .npy, .npz, .bin, .las, .laz, .e57, .obj, .stl.
-    The presets' lengths are metres.
+    SOURCE and TARGET are scans in one unit: .ply, .pcd, .xyz, .txt, .csv, .npy, .npz, .bin, .las, .laz, .e57, .obj,
+    .stl. The presets' lengths are metres.
     """
     chosen = fa.PRESETS[settings].scaled(length_scale)
     guess = None if init is None else read_pose(init)

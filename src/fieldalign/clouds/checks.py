@@ -37,7 +37,7 @@ def checked_points(values: ArrayLike, name: str, threads: int) -> Checked:
         _raise_not_finite(points, name)
     largest = float(np.abs(bounds).max())
     if largest > LARGEST:
-        raise ArgumentError(f"{name} must have coordinates below {LARGEST:g}, but the largest is {largest:g}")
+        raise ArgumentError(f"{name} must have coordinates below {LARGEST:g}, but has {largest:g}")
     _warn_of_lost_precision(points, name, largest, float(np.ptp(bounds, axis=0).max()))
     return Checked(points, bounds, mean)
 
@@ -55,7 +55,7 @@ def without_missing(points: NDArray[Any], name: str, drop: bool, threads: int) -
 def _raise_not_finite(points: NDArray[Any], name: str) -> None:
     bad = ~np.isfinite(points).all(axis=1)
     if not bad.any():  # finite values whose sum is not
-        raise ArgumentError(f"{name} must have coordinates below {LARGEST:g}, but the largest is {np.abs(points).max():g}")
+        raise ArgumentError(f"{name} must have coordinates below {LARGEST:g}, but has {np.abs(points).max():g}")
     row = int(np.flatnonzero(bad)[0])
     raise ArgumentError(f"{name} must be finite, but {int(bad.sum())} rows are not, first row {row}: {points[row]}")
 

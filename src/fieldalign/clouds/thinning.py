@@ -21,9 +21,9 @@ def thin(cloud: PointCloud | ArrayLike, voxel: float, *, threads: int | None = N
     begins at the cloud's own lower corner, so a shifted cloud is thinned alike. Normals, times, intensity, colors and
     attributes are those of each voxel's first point.
 
-    Raises ArgumentError for a voxel that is not positive or is below 1 / 2097152 of the extent, and for infinite points.
+    Raises ArgumentError for a voxel that is not positive or below 1 / 2097152 of the extent, and for infinite points.
     """
-    if not (np.isscalar(voxel) and np.isfinite(voxel) and voxel > 0):
+    if not isinstance(voxel, int | float | np.number) or not (np.isfinite(voxel) and voxel > 0):
         raise ArgumentError(f"voxel must be a positive length, but is {voxel!r}")
     given = cloud if isinstance(cloud, PointCloud) else PointCloud(as_points(cloud, "cloud"))
     cores = resolve_threads(threads)

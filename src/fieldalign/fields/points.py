@@ -70,8 +70,8 @@ class PointField:
         return self._tree.normals(np.ascontiguousarray(x, float), self.normal_neighbours, self.threads)
 
     def drawn(self, count: int, rng: np.random.Generator) -> Floats:
-        """Points (count, 3) drawn with replacement; in the order of the tree's curve, so that neighbours follow each other
-        and each finds the tree's nodes still in the cache."""
+        """Points (count, 3) drawn with replacement, in the order of the tree's curve: neighbours follow each other, and
+        each finds the tree's nodes still in the cache."""
         places = np.sort(rng.integers(0, len(self), count, dtype=np.uint32))
         return np.asarray(self.points[self._tree.rows(places)], float)
 

@@ -23,7 +23,7 @@ class FieldSample:
     foot: (L, 3), place - value * gradient: the nearest place on the surface.
     normal: (L, 3), the surface's unit normal at the foot; its sign means something only where the field is signed.
 
-    place: (L,), where the field itself keeps each foot; a guess for its next sample nearby. None: it keeps no such thing.
+    place: (L,), where the field keeps each foot; a guess for its next sample nearby. None: it keeps no such thing.
 
     `normal` may be given as a function without arguments; it is then worked out when first asked for, since few need
     it. A sample unpacks into the four arrays in this order.
@@ -84,22 +84,21 @@ def sampled(field: DistanceField, x: Floats, last: FieldSample | None = None) ->
 
     last: the field's own sample of the same points a little earlier; those that keep a `place` can start from it.
     """
-    if last is None or last.place is None:
-        answer = field.sample(x)
-    else:
-        answer = field.sample(x, guess=last.place)  # type: ignore[call-arg]
-    sample = answer if isinstance(answer, FieldSample) else FieldSample(*_four(field, answer))
+    guess = {} if last is None or last.place is None else {"guess": last.place}
+    answer: Any = field.sample(x, **guess)
+    sample = answer if isinstance(answer, FieldSample) else _from_tuple(field, answer)
     for name, shape in (("value", (len(x),)), ("gradient", x.shape), ("foot", x.shape)):
         got = np.shape(getattr(sample, name))
         if got != shape:
             raise FieldError(f"{type(field).__name__}.sample must give a {name} of shape {shape}, but gave {got}")
     if not np.isfinite(sample.value.sum() + sample.gradient.sum()):
-        raise FieldError(f"{type(field).__name__}.sample must give finite values and gradients, but gave NaN or infinity")
+        raise FieldError(f"{type(field).__name__}.sample must give finite values and gradients, but gave NaN or inf")
     return sample
 
 
-def _four(field: DistanceField, answer: Any) -> list[Floats]:
+def _from_tuple(field: DistanceField, answer: Any) -> FieldSample:
     parts = list(answer) if isinstance(answer, tuple | list) else []
     if len(parts) != 4:
-        raise FieldError(f"{type(field).__name__}.sample must give value, gradient, foot and normal, but gave {answer!r}")
-    return [np.asarray(part, float) for part in parts]
+        raise FieldError(f"{type(field).__name__}.sample must give four arrays, but gave {answer!r}")
+    value, gradient, foot, normal = (np.asarray(part, float) for part in parts)
+    return FieldSample(value, gradient, foot, normal)

@@ -1,11 +1,11 @@
 """The vertices of OBJ and STL meshes; read only.
 
-Not trimesh's: it drops the vertices of an OBJ that no face uses, doubles those on texture seams, and takes a
-truncated ascii STL for an empty scene.
+OBJ is not read by trimesh: it drops the vertices that no face uses and doubles those on texture seams.
 """
 
 from __future__ import annotations
 
+from os import SEEK_END
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +13,7 @@ import numpy as np
 from ...errors import CloudFileError
 from ..cloud import Array, PointCloud
 
-STL_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("unused", "<u2")])
+STL_TRIANGLE_BYTES = 50
 
 
 def read_obj(path: Path) -> PointCloud:
@@ -26,24 +26,26 @@ def read_obj(path: Path) -> PointCloud:
 
 def read_stl(path: Path) -> PointCloud:
     """The corners of the triangles, each place once."""
+    import trimesh
+
+    _check_whole(path)
+    corners = np.asarray(trimesh.load_mesh(path, process=False).vertices)
+    if not len(corners):
+        raise CloudFileError("is no STL mesh with triangles")
+    return PointCloud(np.unique(corners, axis=0))
+
+
+def _check_whole(path: Path) -> None:
+    """Raises for a truncated file: trimesh takes an ascii one for empty, and a binary one may claim any size."""
+    size = path.stat().st_size
     with path.open("rb") as file:
         head = file.read(84)
-        count = int.from_bytes(head[80:], "little")
-        if len(head) == 84 and path.stat().st_size == 84 + count * STL_TRIANGLE.itemsize:
-            corners = np.fromfile(file, STL_TRIANGLE, count)["corners"].reshape(-1, 3)
-        elif head.lstrip().startswith(b"solid"):
-            corners = _ascii_corners(path)
-        else:
-            raise CloudFileError(f"is no whole STL mesh: neither ascii nor binary of {count} triangles of 50 bytes")
-    return PointCloud(np.unique(corners, axis=0).astype(corners.dtype.newbyteorder("=")))
-
-
-def _ascii_corners(path: Path) -> Array:
-    corners = _numbers_after(path, b"vertex")
-    last_line = path.read_bytes()[-1000:].strip().rpartition(b"\n")[2]
-    if len(corners) % 3 or not last_line.strip().startswith(b"endsolid"):
-        raise CloudFileError("is truncated: an ascii STL ends with 'endsolid'")
-    return corners
+        if len(head) == 84 and size == 84 + STL_TRIANGLE_BYTES * int.from_bytes(head[80:], "little"):
+            return
+        file.seek(-min(size, 1000), SEEK_END)
+        last_line = file.read().strip().rpartition(b"\n")[2].strip()
+    if not (head.lstrip().startswith(b"solid") and last_line.startswith(b"endsolid")):
+        raise CloudFileError("is truncated or no STL: neither ascii up to endsolid nor binary of the size it says")
 
 
 def _numbers_after(path: Path, keyword: bytes) -> Array:

@@ -32,7 +32,7 @@ def read(path: Path) -> PointCloud:
         rows = _read_ascii(file, header) if header.data == "ascii" else pypcd4.PointCloud.from_path(path).pc_data
     if len(rows) != header.points:
         raise CloudFileError(f"promises {header.points} points, but holds {len(rows)}")
-    columns = {name: rows[name] for name in rows.dtype.names if not name.startswith(PADDING)}
+    columns = {name: rows[name] for name in rows.dtype.names or () if not name.startswith(PADDING)}
     known = list(header.viewpoint) != NOT_SET
     viewpoint = pose_from_quaternion(header.viewpoint[:3], header.viewpoint[3:]) if known else None
     return cloud_from_columns(_with_unpacked_colors(columns), viewpoint)

@@ -41,7 +41,7 @@ class _Property(NamedTuple):
 
 class _Element(NamedTuple):
     name: str
-    count: int
+    rows: int
     properties: list[_Property]
 
     @property
@@ -54,8 +54,8 @@ class _Element(NamedTuple):
     def least_bytes(self, order: str) -> int:
         """Of all rows: a list may be empty, and an ascii value takes a digit and a space or line end."""
         if not order:
-            return self.count * 2 * len(self.properties)
-        return self.count * sum(np.dtype(p.length or p.dtype).itemsize for p in self.properties)
+            return self.rows * 2 * len(self.properties)
+        return self.rows * sum(np.dtype(p.length or p.dtype).itemsize for p in self.properties)
 
 
 class _Header(NamedTuple):
@@ -71,7 +71,7 @@ def read(path: Path) -> PointCloud:
         present = path.stat().st_size - file.tell()
         for element in header.elements:
             needed = element.least_bytes(header.order) - (not header.order)  # the last line may lack its end
-            require_bytes(needed, present, f"{element.count} rows of the element {element.name!r}")
+            require_bytes(needed, present, f"{element.rows} rows of the element {element.name!r}")
         vertices = _read_vertices(file, header, present)
     return cloud_from_columns({name: vertices[name] for name in vertices.dtype.names or ()}, header.viewpoint)
 
@@ -133,7 +133,7 @@ def _skip(file: BinaryIO, element: _Element, order: str) -> int:
     """Skips an element before the vertices; the number of bytes it takes."""
     start = file.tell()
     if not order:
-        for _ in islice(file, element.count):
+        for _ in islice(file, element.rows):
             pass
     elif element.has_lists:
         raise CloudFileError(f"has lists before its vertices (element {element.name!r}), which fieldalign cannot read")
@@ -144,16 +144,16 @@ def _skip(file: BinaryIO, element: _Element, order: str) -> int:
 
 def _read_binary(file: BinaryIO, element: _Element, order: str, present: int) -> Array:
     dtype = element.dtype(order)
-    require_bytes(element.count * dtype.itemsize, present, f"{element.count} vertices")
-    return np.fromfile(file, dtype, element.count).astype(dtype.newbyteorder("="), copy=False)
+    require_bytes(element.rows * dtype.itemsize, present, f"{element.rows} vertices")
+    return np.fromfile(file, dtype, element.rows).astype(dtype.newbyteorder("="), copy=False)
 
 
 def _read_ascii(file: BinaryIO, element: _Element, order: str, present: int) -> Array:
-    if not element.count:
+    if not element.rows:
         return np.empty(0, element.dtype(order))
-    rows = np.loadtxt(file, element.dtype(order), max_rows=element.count, comments=None, ndmin=1)
-    if len(rows) != element.count:
-        raise CloudFileError(f"promises {element.count} vertices, but holds {len(rows)}")
+    rows = np.loadtxt(file, element.dtype(order), max_rows=element.rows, comments=None, ndmin=1)
+    if len(rows) != element.rows:
+        raise CloudFileError(f"promises {element.rows} vertices, but holds {len(rows)}")
     return rows
 
 

@@ -27,7 +27,7 @@ class _Head(NamedTuple):
 
     comments: list[str]
     header: str | None
-    count: int | None
+    promised: int | None
     first_row: str
 
     @property
@@ -51,10 +51,10 @@ def read(path: Path) -> PointCloud:
     """Every value as float64."""
     with path.open(encoding="utf-8-sig", errors="replace") as file:
         head = _read_head(file)
-        require_bytes(2 * (head.count or 0), path.stat().st_size, f"{head.count} points")
+        require_bytes(2 * (head.promised or 0), path.stat().st_size, f"{head.promised} points")
         table = _read_table(file, head)
-    if head.count not in (None, len(table)):
-        raise CloudFileError(f"promises {head.count} points in its first line, but holds {len(table)}")
+    if head.promised not in (None, len(table)):
+        raise CloudFileError(f"promises {head.promised} points in its first line, but holds {len(table)}")
     names = head.names()
     if names is None:
         return cloud_from_table(table)
@@ -104,7 +104,7 @@ def _read_table(file: TextIO, head: _Head) -> Array:
         rows = chain([head.first_row], file)
         return np.loadtxt(rows, delimiter=head.delimiter, comments=COMMENTS, ndmin=2)
     names = head.names()
-    if names is None and head.count is None:
+    if names is None and head.promised is None:
         raise CloudFileError("holds no row of numbers")
     return np.empty((0, len(names or "xyz")))
 
