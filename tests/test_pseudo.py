@@ -42,7 +42,8 @@ def is_uniform(values, low, high):
 
 
 def is_normal(values, sigma):
-    return kstest(values, norm(0, sigma).cdf).pvalue > ONCE_IN_A_MILLION
+    has_the_spread = abs(values.std() / sigma - 1) < 4.9 / np.sqrt(2 * len(values))
+    return has_the_spread and kstest(values, norm(0, sigma).cdf).pvalue > ONCE_IN_A_MILLION
 
 
 def test_uniform_fills_a_cube_about_the_centre(corner):
@@ -83,7 +84,7 @@ def test_keypoints_are_left_in_all_directions(corner, sigma):
     drawn = draw_pseudo_points(field, CENTRE, Settings("keypoints", sigma=sigma, pseudo_count=4000), 5)
     # The nearest keypoint is no further than the one that was left, and that is a Gaussian's distance away.
     distances, _ = cKDTree(keypoints).query(drawn)
-    assert np.quantile(distances, 0.99) <= sigma * 3.4  # chi with three freedoms: 3.37 at 99 %
+    assert np.quantile(distances, 0.99) <= sigma * 3.6  # chi with three freedoms: 3.37 at 99 %
     # About its mean the whole set spreads as the keypoints do, plus sigma^2 in each direction.
     assert np.allclose(drawn.mean(axis=0), keypoints.mean(axis=0), atol=0.1)
     assert np.allclose(np.cov(drawn.T) - np.cov(keypoints.T), sigma**2 * np.eye(3), atol=0.09)
@@ -99,7 +100,7 @@ def test_around_one_keypoint_the_spread_is_isotropic(monkeypatch):
 
 
 def test_a_cloud_without_keypoints_is_one_clear_error(rng):
-    with pytest.raises(ArgumentError, match="found no ISS keypoint.*neighbourhood"):
+    with pytest.raises(ArgumentError, match=r"found no ISS keypoint.*neighbourhood"):
         draw_pseudo_points(PointField(np.eye(3)), CENTRE, Settings("keypoints"), 0)
 
 
@@ -136,7 +137,7 @@ def test_any_field_can_have_a_neighbourhood():
 
 
 def test_keypoints_of_another_field_are_one_clear_error():
-    with pytest.raises(ArgumentError, match="'keypoints' needs a target of points.*neighbourhood"):
+    with pytest.raises(ArgumentError, match=r"'keypoints' needs a target of points.*neighbourhood"):
         draw_pseudo_points(Sphere(), CENTRE, Settings("keypoints"), 0)
 
 

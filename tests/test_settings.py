@@ -47,13 +47,11 @@ def test_the_fields_own_ranges_are_checked_too(name, value):
         Settings(**{name: value})
 
 
-@pytest.mark.xfail(strict=True, raises=(TypeError, ValueError), reason="a value of a wrong type raises NumPy's own error")
+@pytest.mark.xfail(strict=True, reason="a value of a wrong type raises an error of NumPy or Python")
 @pytest.mark.parametrize(("name", "value"), [("half_width", None), ("unit", np.ones(2)), ("min_cosine", "0.9")])
 def test_a_value_of_a_wrong_type_is_one_error_that_names_the_field(name, value):
-    try:
+    with pytest.raises(ArgumentError, match=name):
         Settings(**{name: value})
-    except ArgumentError as error:
-        assert name in str(error)
 
 
 @pytest.mark.parametrize(
@@ -129,7 +127,7 @@ def test_settings_by_name_by_default_and_as_they_are():
 
 @pytest.mark.parametrize("settings", ["inside", "", 3, 1.5])
 def test_settings_by_an_unknown_name_list_the_known(settings):
-    with pytest.raises(ArgumentError, match="settings must be .*object, indoor, outdoor"):
+    with pytest.raises(ArgumentError, match=r"settings must be .*object, indoor, outdoor"):
         as_settings(settings)
 
 
