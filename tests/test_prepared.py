@@ -126,7 +126,7 @@ def test_a_cloud_without_three_distinct_points_is_refused(points):
 
 
 def test_a_path_to_nothing_is_a_file_error(tmp_path):
-    with pytest.raises(CloudFileError, match="nothing.ply does not exist"):
+    with pytest.raises(CloudFileError, match=r"nothing\.ply does not exist"):
         prepare(tmp_path / "nothing.ply")
 
 
@@ -244,7 +244,7 @@ def test_a_pair_is_prepared_alike_side_by_side(rng):
 def test_an_error_in_a_thread_names_its_cloud(rng):
     source, target = rng.random((2, 25_000, 3))
     target[5, 1] = np.inf
-    with pytest.raises(ArgumentError, match="^target must be finite"):
+    with pytest.raises(ArgumentError, match=r"^target must be finite"):
         prepare_pair(source, target, 2, True)
-    with pytest.raises(ArgumentError, match="^source must be finite"):
+    with pytest.raises(ArgumentError, match=r"^source must be finite"):
         prepare_pair(target, source, 2, True)

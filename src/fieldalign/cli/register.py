@@ -11,6 +11,8 @@ import numpy as np
 
 import fieldalign as fa
 
+from ..errors import ArgumentError
+from ..whole_file import replacing
 from .poses import read_pose
 from .progress import stages
 
@@ -63,8 +65,8 @@ def command(
 
             title = f"{Path(source).name} onto {Path(target).name}: {result.reason.value}, overlap {result.overlap:.0%}"
             before_and_after(source_cloud, target_cloud, result.T_target_source, picture, title)
-        if json_path not in (None, "-"):
-            Path(str(json_path)).write_text(_as_json(result))
+        if json_path is not None and json_path != "-":
+            _write_text(json_path, _as_json(result))
     if json_path == "-":
         click.echo(_as_json(result))
     else:
@@ -74,6 +76,14 @@ def command(
 
 def _as_json(result: fa.RegistrationResult) -> str:
     return json.dumps(result.to_dict(), indent=1)
+
+
+def _write_text(path: str, text: str) -> None:
+    try:
+        with replacing(path) as unfinished:
+            unfinished.write_text(text)
+    except OSError as error:
+        raise ArgumentError(f"{path} cannot be written: {error.strerror or error}") from error
 
 
 def _print(result: fa.RegistrationResult) -> None:

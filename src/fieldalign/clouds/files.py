@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import os
-import secrets
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import CloudFileError, MissingExtraError
+from ..whole_file import replacing
 from .cloud import PointCloud
 from .formats import e57, kitti, las, mesh, numpy, pcd, ply, text
 
@@ -95,7 +95,7 @@ def write_cloud(path: PathLike, cloud: PointCloud | ArrayLike) -> None:
         if form is None or form.write is None:
             writable = ", ".join(suffix for suffix, form in FORMATS.items() if form.write)
             raise CloudFileError(f"cannot be written: its suffix must be one of {writable}")
-        with _replacing(file) as temporary:
+        with replacing(file) as temporary:
             left_out = form.write(temporary, cloud)
     if left_out:
         logger.warning("%s: %s files have no place for %s", file, file.suffix, ", ".join(left_out))
@@ -140,17 +140,3 @@ def _errors_naming(file: Path, verb: str) -> Iterator[None]:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         first_line = (reason.strip() or type(error).__name__).splitlines()[0]
         raise CloudFileError(f"{file} cannot be {verb} as {file.suffix}: {first_line}") from error
-
-
-@contextmanager
-def _replacing(file: Path) -> Iterator[Path]:
-    """A name beside `file` to write to; what is written there replaces `file`, unless something is raised."""
-    target = Path(os.path.realpath(file))
-    if not target.parent.is_dir():
-        raise CloudFileError(f"cannot be written: there is no folder {target.parent}")
-    temporary = target.with_name(f".{target.stem}.{secrets.token_hex(4)}{target.suffix}")
-    try:
-        yield temporary
-        os.replace(temporary, target)
-    finally:
-        temporary.unlink(missing_ok=True)

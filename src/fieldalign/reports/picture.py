@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..clouds.cloud import PointCloud, as_points
 from ..errors import ArgumentError, missing_extra
+from ..whole_file import replacing
 from . import views
 from .painting import SOURCE_COLOR, TARGET_COLOR, Clouds, Window, paint, window_of
 
@@ -181,10 +182,5 @@ def _add_legend(figure: Figure) -> None:
 
 
 def _save(figure: Figure, path: Path) -> None:
-    """Write beside the path, then put it in place: nobody ever sees half a picture."""
-    unfinished = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
-    try:
+    with replacing(path) as unfinished:
         figure.savefig(unfinished, format=path.suffix[1:].lower())
-        os.replace(unfinished, path)
-    finally:
-        unfinished.unlink(missing_ok=True)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...errors import ArgumentError
+from ...motions import exp_twist, inverse, translation
 from ..cloud import PointCloud
 from .primitives import Array
 from .room import Room, simulate_room
@@ -57,7 +58,7 @@ def simulate_pair(seed: int = 0, points: int = 100_000, overlap: float = 0.6, no
     return ScanPair(
         source=room.scan(world_from_source, points, noise, seed=int(source_seed)),
         target=room.scan(world_from_target, points, noise, seed=int(target_seed)),
-        T_target_source=np.linalg.inv(world_from_target) @ world_from_source,
+        T_target_source=inverse(world_from_target) @ world_from_source,
         overlap=float(room.sees(world_from_target, _surface(room, world_from_source, points)).mean()),
         world_from_target=world_from_target,
     )
@@ -123,15 +124,12 @@ def _longest_motion(rng: np.random.Generator) -> tuple[Array, Array]:
 
 
 def _rotation(vector: ArrayLike) -> Array:
-    """The rotation matrix (3, 3) of a rotation vector (axis times angle in rad): Rodrigues' formula."""
-    x, y, z = np.asarray(vector, float)
-    angle = float(np.linalg.norm([x, y, z]))
-    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]]) / max(angle, 1e-300)
-    return np.asarray(np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K)
+    """The rotation matrix (3, 3) of a rotation vector (axis times angle in rad)."""
+    return exp_twist(np.r_[np.asarray(vector, float), 0, 0, 0])[:3, :3]
 
 
 def _pose(R: Array, position: Array) -> Array:
     """The (4, 4) pose of a rotation and a position."""
-    T = np.eye(4)
-    T[:3, :3], T[:3, 3] = R, position
+    T = translation(position)
+    T[:3, :3] = R
     return T
