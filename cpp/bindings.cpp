@@ -74,7 +74,7 @@ auto nearest(const PointTree& tree, Points<double> queries, int k, int threads) 
     nb::gil_scoped_release free;
     parallel_blocks(n, 128, threads, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
-        KNearest found(static_cast<int>(width));
+        KNearest found(tree, static_cast<int>(width));
         tree.visit(view(queries)[i] - tree.centre(), found);
         for (int j = 0; j < found.found; ++j) {
           distances[i * width + j] = std::sqrt(found.squared[j]);

@@ -30,7 +30,7 @@ inline FieldSample nearest_point_field(const PointTree& tree, Vec3 query, std::u
 
 // The paper's k-mean feature (Sec. V-G.2): the mean of the squared distances to the k nearest points.
 inline FieldSample mean_point_field(const PointTree& tree, Vec3 query, int k) {
-  KNearest nearest(k);
+  KNearest nearest(tree, k);
   tree.visit(query, nearest);
   // Summed along the curve, not by distance: the same neighbours give the same foot, bit by bit.
   std::sort(nearest.position, nearest.position + nearest.found);

@@ -96,9 +96,9 @@ struct Nearest {
   }
 };
 
-// The k nearest points, nearest first.
+// The k nearest points, nearest first; of a smaller tree, all of them.
 struct KNearest {
-  explicit KNearest(int wanted) : k(wanted) {}
+  KNearest(const PointTree& tree, int wanted) : k(static_cast<int>(std::min<std::size_t>(wanted, tree.size()))) {}
   int k, found = 0;
   double squared[PointTree::kMaxNeighbours];
   std::uint32_t position[PointTree::kMaxNeighbours];
@@ -250,7 +250,8 @@ void PointTree::visit(Vec3 query, Collector& collector) const {
   // Boxes (at most 1 in size) and query are rounded to 6e-8 of their size: widened by more, none is taken for too far.
   const float slack = 2e-7f * (1 + std::max({std::abs(q[0]), std::abs(q[1]), std::abs(q[2])}));
   const double per_unit = (1 + 1e-6) / (unit_ * unit_);  // and the rounding of the sum
-  const auto limit = [&] { return static_cast<float>(collector.bound() * per_unit); };
+  constexpr double farthest = std::numeric_limits<float>::max();  // a child that is not there lies beyond
+  const auto limit = [&] { return static_cast<float>(std::min(collector.bound() * per_unit, farthest)); };
   Branch stack[kFan * (kDeepest + 2)];
   int top = 0;
   for (Branch here{0, 0, 0};;) {

@@ -11,7 +11,7 @@ void plane_normals(const PointTree& tree, PointsView<Real> queries, int k, int t
   parallel_blocks(queries.n, 64, threads, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const Vec3 query = queries[i] - tree.centre();
-      KNearest nearest(k);
+      KNearest nearest(tree, k);
       tree.visit(query, nearest);
       Scatter scatter;
       for (int j = 0; j < nearest.found; ++j) scatter.add(tree.local(nearest.position[j]) - query);

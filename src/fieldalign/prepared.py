@@ -12,8 +12,8 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .clouds.checks import without_missing
-from .clouds.cloud import PointCloud, as_points
+from .clouds.checks import checked_points
+from .clouds.cloud import PointCloud
 from .errors import ArgumentError
 from .fields import DistanceField, FieldSample, PointField, sampled
 from .fields.protocol import Floats
@@ -122,16 +122,16 @@ def prepare_named(cloud: CloudLike, name: str, threads: int | None, drop_nonfini
         return cloud
     if isinstance(cloud, DistanceField):
         return PreparedCloud(cloud)
-    points, dropped = without_missing(_points_of(cloud, name), name, drop_nonfinite, resolve_threads(threads))
-    return PreparedCloud(PointField(points, threads=threads), dropped)
+    checked = checked_points(_points_of(cloud), name, resolve_threads(threads), drop_nonfinite)
+    return PreparedCloud(PointField(checked, threads=threads), checked.dropped)
 
 
-def _points_of(cloud: Any, name: str) -> Any:
+def _points_of(cloud: Any) -> Any:
     if isinstance(cloud, str | Path | os.PathLike):
         from .clouds.files import read_cloud  # the libraries behind it load only where a file is read
 
         cloud = read_cloud(cloud)
-    return cloud.points if isinstance(cloud, PointCloud) else as_points(cloud, name)
+    return cloud.points if isinstance(cloud, PointCloud) else cloud
 
 
 def _bounds(field: DistanceField) -> Floats:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from time import perf_counter
 from typing import Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from .alignment import align
 from .alignment.residual import residual
+from .arguments import as_count
 from .errors import ArgumentError
 from .fields import sampled
 from .motions import apply, as_rigid, inverse, translation
@@ -52,7 +52,7 @@ def register(
     that is not rigid, and for settings out of range; CloudFileError for a file that cannot be read.
     """
     _refuse_what_is_missing(method, search, search_radius, search_angle, dof, scale)
-    chosen, seed, threads = as_settings(settings), _as_seed(seed), resolve_threads(threads)
+    chosen, seed, threads = as_settings(settings), as_count(seed, "seed", 0), resolve_threads(threads)
     clock = _Clock()
     moving, fixed = prepare_pair(source, target, threads, drop_nonfinite)
     clock.lap("prepare")
@@ -63,9 +63,9 @@ def register(
     found = align(field, target_features, pseudo, T_start, (moving.centre, fixed.centre), chosen)
     clock.lap("align")
     at_source = sampled(field, apply(inverse(found.T_target_source), pseudo), found.at_source)
-    reason = judge(found, moving)
     known = certainty(at_source, pseudo, found, residual(at_source, target_features), chosen)
     overlap, overlap_target = overlaps(moving, fixed, found.T_target_source)
+    reason = judge(found, moving, (overlap, overlap_target))
     clock.lap("judge")
     return RegistrationResult(
         T_target_source=found.T_target_source,
@@ -95,12 +95,6 @@ class _Clock:
     def lap(self, stage: str) -> None:
         now = perf_counter()
         self.laps[stage], self._last = now - self._last, now
-
-
-def _as_seed(seed: int) -> int:
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
-        raise ArgumentError(f"seed must be an integer of at least 0, but is {seed!r}")
-    return int(seed)
 
 
 def _refuse_what_is_missing(

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .arguments import MAX_NEIGHBOURS, as_count, check_one_of, check_positive, is_number
 from .clouds.cloud import as_points
 from .errors import ArgumentError
 
@@ -15,7 +16,7 @@ PseudoSet = Literal["uniform", "neighbourhood", "keypoints"]
 DirectionRule = Literal["feet", "normals", "none"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Settings:
     """Settings of the paper's method (Yuan & Nüchter, RA-L 2022); lengths in the clouds' unit, metres in the presets.
 
@@ -67,24 +68,33 @@ class Settings:
     unit: float = 1.0
 
     def __post_init__(self) -> None:
-        _one_of("pseudo_set", self.pseudo_set, ("uniform", "neighbourhood", "keypoints"))
-        _one_of("direction", self.direction, ("feet", "normals", "none"))
+        check_one_of("pseudo_set", self.pseudo_set, ("uniform", "neighbourhood", "keypoints"))
+        check_one_of("direction", self.direction, ("feet", "normals", "none"))
         for name in ("half_width", "irls_distance", "irls_tolerance", "tolerance", "unit"):
-            _positive(name, getattr(self, name))
+            check_positive(name, getattr(self, name))
         if self.sigma is not None:
-            _positive("sigma", self.sigma)
-        whole = {"pseudo_count": 6, "irls_steps": 1, "min_kept": 6, "max_iterations": 1}
-        for name, lowest in whole.items():
-            _at_least(name, getattr(self, name), lowest)
+            check_positive("sigma", self.sigma)
+        for name, lowest in (("pseudo_count", 6), ("irls_steps", 1), ("min_kept", 6), ("max_iterations", 1)):
+            as_count(getattr(self, name), name, lowest)
+        as_count(self.neighbours, "neighbours", 1, MAX_NEIGHBOURS)
+        as_count(self.normal_neighbours, "normal_neighbours", 3, MAX_NEIGHBOURS)
         if self.share_limit is not None:
-            _at_least("share_limit", self.share_limit, 1)
-        if not -1 <= self.min_cosine < 1:
-            raise ArgumentError(f"min_cosine must lie in [-1, 1), but is {self.min_cosine!r}")
+            as_count(self.share_limit, "share_limit", 1)
+        if not is_number(self.min_cosine) or not -1 <= self.min_cosine < 1:
+            raise ArgumentError(f"min_cosine must be a number in [-1, 1), but is {self.min_cosine!r}")
+        if not isinstance(self.irls, bool):
+            raise ArgumentError(f"irls must be True or False, but is {self.irls!r}")
         if self.pseudo_points is not None:
             points = as_points(self.pseudo_points, "pseudo_points").astype(float)
             if len(points) < 6 or not np.isfinite(points).all():
                 raise ArgumentError(f"pseudo_points must be at least 6 finite points, but are {len(points)} rows")
             object.__setattr__(self, "pseudo_points", points)
+
+    def __eq__(self, other: object) -> bool:
+        """Equal in every field; pseudo points by their values."""
+        if not isinstance(other, Settings):
+            return NotImplemented
+        return all(np.array_equal(getattr(self, f.name), getattr(other, f.name)) for f in fields(self))
 
     @property
     def spread(self) -> float:
@@ -93,25 +103,10 @@ class Settings:
 
     def scaled(self, factor: float) -> Settings:
         """The same settings for clouds in another unit or of another size: every length times `factor`."""
-        _positive("factor", factor)
+        check_positive("factor", factor)
         lengths = ("half_width", "sigma", "irls_distance", "unit", "pseudo_points")
         given = {f.name: getattr(self, f.name) for f in fields(self) if f.name in lengths}
         return replace(self, **{name: value * factor for name, value in given.items() if value is not None})
-
-
-def _one_of(name: str, value: object, allowed: tuple[str, ...]) -> None:
-    if value not in allowed:
-        raise ArgumentError(f"{name} must be one of {', '.join(allowed)}, but is {value!r}")
-
-
-def _positive(name: str, value: float) -> None:
-    if not (np.isreal(value) and np.isfinite(value) and value > 0):
-        raise ArgumentError(f"{name} must be a positive number, but is {value!r}")
-
-
-def _at_least(name: str, value: int, lowest: int) -> None:
-    if isinstance(value, bool) or not isinstance(value, int) or value < lowest:
-        raise ArgumentError(f"{name} must be an integer of at least {lowest}, but is {value!r}")
 
 
 PRESETS = {
@@ -131,6 +126,6 @@ def as_settings(settings: Settings | str | None) -> Settings:
     if isinstance(settings, Settings):
         return settings
     name = "indoor" if settings is None else settings
-    if name not in PRESETS:
+    if not isinstance(name, str) or name not in PRESETS:
         raise ArgumentError(f"settings must be a Settings object or one of {', '.join(PRESETS)}, but is {settings!r}")
     return PRESETS[name]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 
-from .errors import ArgumentError
+from .arguments import as_count
 
 
 def resolve_threads(threads: int | None) -> int:
@@ -12,6 +12,4 @@ def resolve_threads(threads: int | None) -> int:
     if threads is None:
         affinity = getattr(os, "sched_getaffinity", None)  # not on macOS and Windows
         return len(affinity(0)) if affinity else os.cpu_count() or 1
-    if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
-        raise ArgumentError(f"threads must be None (all cores) or an integer of at least 1, but is {threads!r}")
-    return threads
+    return as_count(threads, "threads", 1)

@@ -17,6 +17,7 @@ from .result import Reason
 from .settings import Settings
 
 STILL = 1e-3  # of the extent: a last increment that moves some point further has not converged
+MIN_OVERLAP = 0.2  # of either surface: with less, what agrees may be chance
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,11 +30,11 @@ class Certainty:
     reference_point: Floats
 
 
-def judge(alignment: Alignment, source: PreparedCloud) -> Reason:
-    """Whether enough pseudo points remain and the last increment moves no point of the source far."""
+def judge(alignment: Alignment, source: PreparedCloud, overlap: tuple[float, float]) -> Reason:
+    """Whether enough pseudo points and surface remain, and the last increment moves no point of the source far."""
     w, v = np.split(alignment.steps[-1].increment, 2)
     moves = np.linalg.norm(w) * source.extent / 2 + np.linalg.norm(v)
-    if not alignment.strict:
+    if not alignment.strict or max(overlap) < MIN_OVERLAP:
         return Reason.LOW_OVERLAP
     return Reason.NOT_CONVERGED if moves > STILL * source.extent else Reason.ACCEPTED
 

@@ -371,7 +371,7 @@ def test_a_written_file_has_the_usual_permissions_and_links_stay_links(tmp_path)
 @pytest.mark.parametrize("suffix", WRITABLE)
 def test_a_missing_folder_is_one_clear_error(suffix, tmp_path):
     needs_library(suffix)
-    with pytest.raises(CloudFileError, match=r"nowhere/scan.* cannot be written as .*: there is no folder .*nowhere"):
+    with pytest.raises(CloudFileError, match=r"nowhere/scan.* cannot be written: there is no folder .*nowhere"):
         write_cloud(tmp_path / "nowhere" / f"scan{suffix}", plain_cloud())
 
 

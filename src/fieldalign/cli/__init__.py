@@ -40,6 +40,9 @@ def main(args: list[str] | None = None) -> None:
     """Runs a command; an error of the user is one line on stderr and exit status 1."""
     try:
         status = cli.main(args=args, prog_name="fieldalign", standalone_mode=False)
+    except click.exceptions.NoArgsIsHelpError as error:
+        click.echo(error.format_message())
+        sys.exit(1)
     except click.ClickException as error:
         _fail(error.format_message())
     except FieldalignError as error:

@@ -35,7 +35,10 @@ def command(output: str, seed: int, points: int) -> int:
     if _can_draw():
         arguments += ["--picture", "picture.png"]
     click.echo(f"$ cd {folder} && fieldalign register {' '.join(arguments)}")
+    (folder / "result.json").unlink(missing_ok=True)
     status = subprocess.run([sys.executable, "-m", "fieldalign", "register", *arguments], cwd=folder).returncode
+    if not (folder / "result.json").exists():
+        return status
     result = json.loads((folder / "result.json").read_text())
     T = np.array(result["T_target_source"])
     click.echo(

@@ -20,7 +20,7 @@ def read_pose(text: str) -> Matrix:
     """
     try:
         values = _from_file(Path(text)) if Path(text).is_file() else np.array(text.replace(",", " ").split(), float)
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, EOFError) as error:
         raise ArgumentError(f"init must be a file with a 4 x 4 pose or 16 numbers, but is {text!r}: {error}") from error
     if np.size(values) != 16:
         raise ArgumentError(f"init must hold 16 numbers (4 x 4, row by row), but {text!r} holds {np.size(values)}")

@@ -11,6 +11,7 @@ import numpy as np
 
 import fieldalign as fa
 
+from ..clouds.files import writer_of
 from ..errors import ArgumentError
 from ..whole_file import replacing
 from .poses import read_pose
@@ -25,7 +26,7 @@ from .progress import stages
 @click.option("--json", "json_path", type=click.Path(allow_dash=True), help="Write the result as JSON; - for stdout.")
 @click.option("--picture", type=click.Path(), help="Draw both clouds before and after (.png, .svg, .pdf).")
 @click.option("--settings", type=click.Choice(list(fa.PRESETS)), default="indoor", show_default=True)
-@click.option("--length-scale", type=float, default=1.0, show_default=True,
+@click.option("--length-scale", type=click.FloatRange(min=0, min_open=True), default=1.0, show_default=True,
               help="Multiply every length of the settings: 1000 for millimetres, 0.1 for a tenth of the size.")
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of the pseudo points.")
 @click.option("--threads", type=int, default=None, help="How many threads; all cores by default.")
@@ -48,15 +49,14 @@ def command(
     """
     chosen = fa.PRESETS[settings].scaled(length_scale)
     guess = None if init is None else read_pose(init)
-    with stages("reading source", "reading target", "preparing", "aligning", "writing") as stage:
+    _check_outputs(output, picture)
+    with stages("reading source", "reading target", "aligning", "writing") as stage:
         stage()
         source_cloud = fa.read_cloud(source)
         stage()
         target_cloud = fa.read_cloud(target)
         stage()
-        prepared = fa.prepare(target_cloud, threads=threads)
-        stage()
-        result = fa.register(source_cloud, prepared, init=guess, settings=chosen, seed=seed, threads=threads)
+        result = fa.register(source_cloud, target_cloud, init=guess, settings=chosen, seed=seed, threads=threads)
         stage()
         if output is not None:
             fa.write_cloud(output, source_cloud.transformed(result.T_target_source))
@@ -72,6 +72,16 @@ def command(
     else:
         _print(result)
     return 0 if result.accepted else 3
+
+
+def _check_outputs(output: str | None, picture: str | None) -> None:
+    """What cannot be written is said before the work, not after it."""
+    if output is not None:
+        writer_of(output)
+    if picture is not None:
+        from ..reports.picture import checked_path
+
+        checked_path(picture)
 
 
 def _as_json(result: fa.RegistrationResult) -> str:

@@ -18,19 +18,23 @@ LARGEST = 1e15  # of a coordinate: beyond, float64 leaves less than a unit of re
 
 @dataclass(frozen=True, eq=False)
 class Checked:
-    """Points (N, 3) in which nothing is wrong, the corners (2, 3) of their bounding box, and their mean (3,)."""
+    """Points (N, 3) in which nothing is wrong, the corners (2, 3) of their bounding box, their mean (3,), and how many
+    NaN rows were left out."""
 
     points: NDArray[Any]
     bounds: NDArray[np.float64]
     mean: NDArray[np.float64]
+    dropped: int
 
 
-def checked_points(values: ArrayLike, name: str, threads: int) -> Checked:
+def checked_points(values: ArrayLike, name: str, threads: int, drop_nan: bool = False) -> Checked:
     """Points (N, 3) that are finite, of a size float64 can hold, and at least 3 of them distinct.
 
-    Raises ArgumentError that names the argument otherwise; warns where float32 has already lost precision.
+    drop_nan: rows with NaN are missing returns, left out and counted. Raises ArgumentError that names the argument
+    where anything else is wrong; warns where float32 has already lost precision.
     """
-    points = as_points(values, name)
+    given = as_points(values, name)
+    points = without_missing(given, name, threads) if drop_nan else given
     _check_distinct(points, name)
     bounds, mean = _core.survey(points, threads)
     if not np.isfinite(mean).all():
@@ -39,17 +43,16 @@ def checked_points(values: ArrayLike, name: str, threads: int) -> Checked:
     if largest > LARGEST:
         raise ArgumentError(f"{name} must have coordinates below {LARGEST:g}, but has {largest:g}")
     _warn_of_lost_precision(points, name, largest, float(np.ptp(bounds, axis=0).max()))
-    return Checked(points, bounds, mean)
+    return Checked(points, bounds, mean, len(given) - len(points))
 
 
-def without_missing(points: NDArray[Any], name: str, drop: bool, threads: int) -> tuple[NDArray[Any], int]:
-    """The points without NaN rows, and how many those were; infinity raises, and NaN too where `drop` is false."""
+def without_missing(points: NDArray[Any], name: str, threads: int) -> NDArray[Any]:
+    """The points (N, 3) without the rows that hold NaN; raises ArgumentError where infinity is among them."""
     if not len(points) or np.isfinite(_core.survey(points, threads)[1]).all():
-        return points, 0
-    missing = np.isnan(points).any(axis=1)
-    if not drop or np.isinf(points).any():
+        return points
+    if np.isinf(points).any():
         _raise_not_finite(points, name)
-    return points[~missing], int(missing.sum())
+    return np.asarray(points[~np.isnan(points).any(axis=1)])
 
 
 def _raise_not_finite(points: NDArray[Any], name: str) -> None:

@@ -89,7 +89,7 @@ def as_points(values: ArrayLike, name: str) -> Array:
         raise ArgumentError(f"{name} must be an (N, 3) array of real numbers, but has dtype {array.dtype}")
     if array.ndim != 2 or array.shape[1] != 3:
         raise ArgumentError(f"{name} must have shape (N, 3), but has shape {array.shape}")
-    return np.ascontiguousarray(array, np.float32 if array.dtype == np.float32 else np.float64)
+    return np.ascontiguousarray(array, np.float32 if array.dtype.newbyteorder("=") == np.float32 else np.float64)
 
 
 def _per_point(values: ArrayLike, name: str, n: int, widths: tuple[int, ...] | None) -> Array:

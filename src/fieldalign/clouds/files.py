@@ -90,15 +90,23 @@ def write_cloud(path: PathLike, cloud: PointCloud | ArrayLike) -> None:
     """
     cloud = cloud if isinstance(cloud, PointCloud) else PointCloud(np.asarray(cloud))
     file = Path(path)
-    with _errors_naming(file, "written"):
-        form = FORMATS.get(file.suffix.lower())
-        if form is None or form.write is None:
-            writable = ", ".join(suffix for suffix, form in FORMATS.items() if form.write)
-            raise CloudFileError(f"cannot be written: its suffix must be one of {writable}")
-        with replacing(file) as temporary:
-            left_out = form.write(temporary, cloud)
+    write = writer_of(path)
+    with _errors_naming(file, "written"), replacing(file) as temporary:
+        left_out = write(temporary, cloud)
     if left_out:
         logger.warning("%s: %s files have no place for %s", file, file.suffix, ", ".join(left_out))
+
+
+def writer_of(path: PathLike) -> Callable[[Path, PointCloud], list[str]]:
+    """What writes a file of this suffix; raises CloudFileError where nothing does, or where the folder is missing."""
+    file = Path(path)
+    form = FORMATS.get(file.suffix.lower())
+    if form is None or form.write is None:
+        writable = ", ".join(suffix for suffix, form in FORMATS.items() if form.write)
+        raise CloudFileError(f"{file} cannot be written: its suffix must be one of {writable}")
+    if not file.absolute().parent.is_dir():
+        raise CloudFileError(f"{file} cannot be written: there is no folder {file.parent}")
+    return form.write
 
 
 def _split(path: PathLike) -> tuple[Path, str | None]:

@@ -27,10 +27,10 @@ def thin(cloud: PointCloud | ArrayLike, voxel: float, *, threads: int | None = N
         raise ArgumentError(f"voxel must be a positive length, but is {voxel!r}")
     given = cloud if isinstance(cloud, PointCloud) else PointCloud(as_points(cloud, "cloud"))
     cores = resolve_threads(threads)
-    points, dropped = without_missing(given.points, "cloud", True, cores)
+    points = without_missing(given.points, "cloud", cores)
     if not len(points):
         return given[:0]
-    if dropped:
+    if len(points) < len(given):
         given = given[~np.isnan(given.points).any(axis=1)]
     bounds, _ = _core.survey(points, cores)
     try:

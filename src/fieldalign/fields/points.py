@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import _core
-from ..clouds.checks import checked_points
-from ..errors import ArgumentError
+from ..arguments import MAX_NEIGHBOURS, as_count
+from ..clouds.checks import Checked, checked_points
 from ..threads import resolve_threads
 from .protocol import FieldSample, Floats
 
@@ -30,12 +30,12 @@ class PointField:
     signed = False
 
     def __init__(
-        self, points: ArrayLike, neighbours: int = 1, normal_neighbours: int = 10, threads: int | None = None
+        self, points: ArrayLike | Checked, neighbours: int = 1, normal_neighbours: int = 10, threads: int | None = None
     ) -> None:
-        self.neighbours = _within(neighbours, "neighbours", 1)
-        self.normal_neighbours = _within(normal_neighbours, "normal_neighbours", 3)
+        self.neighbours = as_count(neighbours, "neighbours", 1, MAX_NEIGHBOURS)
+        self.normal_neighbours = as_count(normal_neighbours, "normal_neighbours", 3, MAX_NEIGHBOURS)
         self.threads = resolve_threads(threads)
-        checked = checked_points(points, "points", self.threads)
+        checked = points if isinstance(points, Checked) else checked_points(points, "points", self.threads)
         self.points, self.bounds, self.centre = checked.points, checked.bounds, checked.mean
         self._tree = _core.PointTree(self.points, self.threads)
 
@@ -45,8 +45,8 @@ class PointField:
     def using(self, neighbours: int, normal_neighbours: int, threads: int | None) -> PointField:
         """The same points under other settings; the tree is shared."""
         other = copy.copy(self)
-        other.neighbours = _within(neighbours, "neighbours", 1)
-        other.normal_neighbours = _within(normal_neighbours, "normal_neighbours", 3)
+        other.neighbours = as_count(neighbours, "neighbours", 1, MAX_NEIGHBOURS)
+        other.normal_neighbours = as_count(normal_neighbours, "normal_neighbours", 3, MAX_NEIGHBOURS)
         other.threads = resolve_threads(threads)
         return other
 
@@ -63,7 +63,7 @@ class PointField:
     def nearest(self, x: ArrayLike, neighbours: int = 1) -> tuple[Floats, NDArray[np.int64]]:
         """Distances (L, k) and rows (L, k) of the k nearest points to the places x (L, 3), nearest first."""
         places = np.ascontiguousarray(x, float)
-        return self._tree.nearest(places, _within(neighbours, "neighbours", 1), self.threads)
+        return self._tree.nearest(places, as_count(neighbours, "neighbours", 1, MAX_NEIGHBOURS), self.threads)
 
     def normals(self, x: ArrayLike) -> Floats:
         """Unit normals (L, 3) of the planes through the nearest points to the places x (L, 3); sign free."""
@@ -90,9 +90,3 @@ class PointField:
         stride = max(1, len(self) // 4096)
         resolution = float(self.spacing(self.points[::stride]).mean())
         return self._tree.keypoints(6 * resolution, 4 * resolution, gamma, gamma, min_neighbours, self.threads)
-
-
-def _within(value: int, name: str, lowest: int) -> int:
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not lowest <= value <= 64:
-        raise ArgumentError(f"{name} must be an integer from {lowest} to 64, but is {value!r}")
-    return int(value)

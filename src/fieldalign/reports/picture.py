@@ -48,7 +48,7 @@ def before_and_after(
     A ceiling is left out, so that one looks into the room. Raises MissingExtraError without matplotlib, and
     ArgumentError for a path, cloud, pose or direction that cannot be.
     """
-    path = _checked_path(path)
+    path = checked_path(path)
     T = _checked(T_target_source, (4, 4), "T_target_source")
     upward = _checked(up, (3,), "up")
     if not upward.any():
@@ -71,7 +71,8 @@ def before_and_after(
     return path
 
 
-def _checked_path(path: str | os.PathLike[str]) -> Path:
+def checked_path(path: str | os.PathLike[str]) -> Path:
+    """The path, if a picture can be written there; raises ArgumentError for another suffix or a missing folder."""
     path = Path(path)
     if path.suffix.lower() not in _SUFFIXES:
         raise ArgumentError(f"path must end in one of {', '.join(_SUFFIXES)}, but is {str(path)!r}")

@@ -1,0 +1,16 @@
+"""Every example runs from top to bottom."""
+
+import runpy
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("*.py"))
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
+def test_example(example, capsys):
+    runpy.run_path(str(example), run_name="__main__")
+    said = capsys.readouterr().out
+    assert "accepted" in said.lower()
+    assert "not accepted" not in said.lower()
