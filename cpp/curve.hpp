@@ -1,6 +1,8 @@
 // Points in the order of Morton's curve: near on the curve is near in space, and a run of codes is a box.
 #pragma once
 
+#include <array>
+
 #include "survey.hpp"
 #include "radix_sort.hpp"
 
@@ -15,18 +17,23 @@ Bounds bounds_of(std::size_t n, Point point, int threads) {
 }
 
 // Spreads the lowest ten bits of v to every third bit.
-inline std::uint32_t spread(std::uint32_t v) {
+constexpr std::uint32_t spread(std::uint32_t v) {
   v = (v | (v << 16)) & 0x030000FF;
   v = (v | (v << 8)) & 0x0300F00F;
   v = (v | (v << 4)) & 0x030C30C3;
   return (v | (v << 2)) & 0x09249249;
 }
 
-// Codes the items' points in 1024^3 cells over their own bounds and sorts them by code, then by row.
+constexpr auto kSpread = [] {
+  std::array<std::uint32_t, 1024> table{};
+  for (std::uint32_t v = 0; v < table.size(); ++v) table[v] = spread(v);
+  return table;
+}();
+
+// Codes the items' points in 1024^3 cells over their bounds and sorts them by code, then by row.
 // False where all the points are equal: no cells can part them.
 template <class Real>
-bool sort_along_curve(PointsView<Real> points, std::span<Placed> items, int threads) {
-  const Bounds bounds = bounds_of(items.size(), [&](std::size_t i) { return points[items[i].index]; }, threads);
+bool sort_along_curve(PointsView<Real> points, std::span<Placed> items, const Bounds& bounds, int threads) {
   const Vec3 extent = bounds.hi - bounds.lo;
   const double longest = std::max({extent.x, extent.y, extent.z});
   const double scale = 1023.999 / longest;
@@ -34,8 +41,8 @@ bool sort_along_curve(PointsView<Real> points, std::span<Placed> items, int thre
   parallel_blocks(items.size(), kPointBlock, threads, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const Vec3 cell = scale * (points[items[i].index] - bounds.lo);
-      items[i].key = spread(static_cast<std::uint32_t>(cell.x)) | spread(static_cast<std::uint32_t>(cell.y)) << 1 |
-                     spread(static_cast<std::uint32_t>(cell.z)) << 2;
+      items[i].key = kSpread[static_cast<std::int32_t>(cell.x)] | kSpread[static_cast<std::int32_t>(cell.y)] << 1 |
+                     kSpread[static_cast<std::int32_t>(cell.z)] << 2;
     }
   });
   const auto by_code = [](const Placed& a, const Placed& b) {

@@ -1,4 +1,4 @@
-// Exact nearest neighbours: a tree of boxes, four to a node, whose splits are the bits of the points' codes on Morton's
+// Exact nearest neighbours: a tree of boxes, eight to a node, whose splits are the bits of the points' codes on Morton's
 // curve.
 //
 // Sorting along the curve is a radix sort and each split a binary search, so building is linear in the points but for
@@ -23,9 +23,9 @@ class PointTree {
   template <class Real>
   PointTree(PointsView<Real> points, int threads);
 
-  std::size_t size() const { return points_.size(); }
+  std::size_t size() const { return rows_.size(); }
   Vec3 centre() const { return centre_; }
-  Vec3 local(std::uint32_t position) const { return points_[position]; }  // relative to centre()
+  Vec3 local(std::uint32_t position) const { return {x_[position], y_[position], z_[position]}; }  // relative to centre()
   std::uint32_t row(std::uint32_t position) const { return rows_[position]; }
 
   // Offers points to `collector` (bound() and offer(squared distance, position)), near ones first, until none is left
@@ -34,16 +34,20 @@ class PointTree {
   void visit(Vec3 query, Collector& collector) const;
 
  private:
-  static constexpr int kFan = 4;                // halves of halves
-  static constexpr std::size_t kLeaf = 32;      // the most points of a leaf, but for points that are all equal
+  static constexpr int kFan = 8;
+  static constexpr std::size_t kEnough = 16;    // points that are not parted further, though a node has room
+  static constexpr std::size_t kLeaf = 48;      // the most points of a leaf, but for points that are all equal
   static constexpr std::size_t kTwig = 16384;   // the most points of a subtree that one thread grows
-  static constexpr int kDeepest = 48;           // levels: details of 1e-9 of the extent, and what is finer is a leaf
+  static constexpr int kDeepest = 32;           // levels: details of 1e-9 of the extent, and what is finer is a leaf
+  static constexpr std::size_t kOverrun = 3;    // how far behind a leaf least_squared() may read
 
-  // Two cache lines. Boxes are float32 in units of unit_, so that any scale fits; visit() allows for their rounding.
+  using Four = Lanes<float>;
+
+  // Four cache lines. Boxes are float32 in units of unit_, so that any scale fits; visit() allows for their rounding.
   struct alignas(64) Node {
-    float lo[3][kFan], hi[3][kFan];
-    std::uint32_t child[kFan];  // a leaf's first point, or how many nodes further the child stands
-    std::uint32_t count[kFan];  // a leaf's points; 0: not a leaf
+    Four lo[3][kFan / Four::kCount], hi[3][kFan / Four::kCount];
+    std::uint32_t begin[kFan];  // a leaf's first point, or how many nodes further the child stands
+    std::uint32_t end[kFan];    // behind a leaf's last point; 0: not a leaf
   };
   struct Range {
     std::size_t begin, end;
@@ -59,7 +63,7 @@ class PointTree {
   // What grew from a range: a leaf, or the first of the nodes that were appended.
   struct Grown {
     Bounds bounds;
-    std::uint32_t leaf_points;
+    bool is_leaf;
   };
   struct Twig {
     std::vector<Node> nodes;
@@ -67,11 +71,11 @@ class PointTree {
   };
 
   template <class Real>
-  static Split split(PointsView<Real> points, std::span<Placed> order, Range range, std::size_t most, int depth,
-                     int threads);
+  static Split split(PointsView<Real> points, std::span<Placed> order, Range range, int depth, int threads);
   template <class Real>
   static void split_to_twigs(PointsView<Real> points, std::span<Placed> order, Range range, int depth, int threads,
                              std::vector<Split>& splits);
+  double least_squared(Vec3 query, std::size_t begin, std::size_t end) const;
   template <class Grow>
   Grown join(std::vector<Node>& nodes, const Split& split, Grow grow) const;
   template <class Real>
@@ -81,7 +85,7 @@ class PointTree {
 
   Vec3 centre_;
   double unit_ = 1;                   // half the longest edge of the bounds
-  std::vector<Vec3> points_;          // along the curve
+  std::vector<double> x_, y_, z_;     // along the curve, and kOverrun zeros
   std::vector<std::uint32_t> rows_;   // position along the curve -> row of the array given
   std::vector<Node> nodes_;           // depth first
 };
@@ -128,26 +132,30 @@ struct Within {
 template <class Real>
 std::size_t middle_of(PointsView<Real> points, std::span<Placed> order, std::size_t begin, std::size_t end, int threads) {
   const auto items = order.subspan(begin, end - begin);
-  if (items.front().key == items.back().key && !sort_along_curve(points, items, threads)) return begin;
+  if (items.front().key == items.back().key) {
+    const Bounds bounds = bounds_of(items.size(), [&](std::size_t i) { return points[items[i].index]; }, threads);
+    if (!sort_along_curve(points, items, bounds, threads)) return begin;
+  }
   const int bit = 31 - std::countl_zero(items.front().key ^ items.back().key);
   const auto lacks_bit = [bit](const Placed& p) { return (p.key >> bit & 1) == 0; };
   return begin + (std::partition_point(items.begin(), items.end(), lacks_bit) - items.begin());
 }
 
-// Halves a range of more than `most` points, and its halves.
+// Halves the largest part again and again, until a node is full or no part has more than kEnough points.
 template <class Real>
-PointTree::Split PointTree::split(PointsView<Real> points, std::span<Placed> order, Range range, std::size_t most,
-                                  int depth, int threads) {
+PointTree::Split PointTree::split(PointsView<Real> points, std::span<Placed> order, Range range, int depth, int threads) {
   Split result{range, depth, 1, {range}};
-  for (int round = 0; round < 2 && depth < kDeepest; ++round) {
-    const Split before = result;
-    result.parts = 0;
-    for (int k = 0; k < before.parts; ++k) {
-      const auto [begin, end] = before.part[k];
-      const std::size_t middle = end - begin > most ? middle_of(points, order, begin, end, threads) : begin;
-      if (middle != begin) result.part[result.parts++] = {begin, middle};
-      result.part[result.parts++] = {middle, end};
-    }
+  std::array<std::size_t, kFan> points_to_part{range.size()};  // 0: cannot be parted
+  while (result.parts < kFan && depth < kDeepest) {
+    const auto k = std::max_element(points_to_part.begin(), points_to_part.end()) - points_to_part.begin();
+    if (points_to_part[k] <= kEnough) break;
+    const auto [begin, end] = result.part[k];
+    const std::size_t middle = middle_of(points, order, begin, end, threads);
+    points_to_part[k] = middle - begin;
+    if (middle == begin) continue;
+    points_to_part[result.parts] = end - middle;
+    result.part[k].end = middle;
+    result.part[result.parts++] = {middle, end};
   }
   return result;
 }
@@ -156,7 +164,8 @@ PointTree::Split PointTree::split(PointsView<Real> points, std::span<Placed> ord
 template <class Real>
 void PointTree::split_to_twigs(PointsView<Real> points, std::span<Placed> order, Range range, int depth, int threads,
                                std::vector<Split>& splits) {
-  const Split parted = split(points, order, range, kTwig, depth, threads);
+  const Split parted =
+      range.size() > kTwig ? split(points, order, range, depth, threads) : Split{range, depth, 1, {range}};
   splits.push_back(parted);
   if (!parted.is_parted()) return;
   for (int k = 0; k < parted.parts; ++k) split_to_twigs(points, order, parted.part[k], depth + 1, threads, splits);
@@ -169,25 +178,27 @@ PointTree::Grown PointTree::join(std::vector<Node>& nodes, const Split& split, G
   nodes.push_back({});
   Bounds all;
   for (int k = 0; k < kFan; ++k) {
-    const bool there = k < split.parts;
+    // A child that is not there is a leaf without points, infinitely far from anywhere.
+    const Range part = k < split.parts ? split.part[k] : Range{1, 1};
     const auto place = static_cast<std::uint32_t>(nodes.size() - self);
-    const Grown child = there ? grow(split.part[k]) : Grown{};  // a child that is not there is infinitely far from anywhere
+    const Grown child = k < split.parts ? grow(part) : Grown{{}, true};
     Node& node = nodes[self];
-    node.count[k] = child.leaf_points;
-    node.child[k] = there && child.leaf_points ? static_cast<std::uint32_t>(split.part[k].begin) : place;
+    node.begin[k] = child.is_leaf ? static_cast<std::uint32_t>(part.begin) : place;
+    node.end[k] = child.is_leaf ? static_cast<std::uint32_t>(part.end) : 0;
     for (int axis = 0; axis < 3; ++axis) {
-      node.lo[axis][k] = static_cast<float>(child.bounds.lo[axis] / unit_);
-      node.hi[axis][k] = static_cast<float>(child.bounds.hi[axis] / unit_);
+      node.lo[axis][k / Four::kCount].v[k % Four::kCount] = static_cast<float>(child.bounds.lo[axis] / unit_);
+      node.hi[axis][k / Four::kCount].v[k % Four::kCount] = static_cast<float>(child.bounds.hi[axis] / unit_);
     }
     all = merged(all, child.bounds);
   }
-  return {all, 0};
+  return {all, false};
 }
 
 template <class Real>
 PointTree::Grown PointTree::grow(PointsView<Real> points, std::span<Placed> order, Range range, int depth,
                                  std::vector<Node>& nodes) {
-  const Split parted = split(points, order, range, kLeaf, depth, 1);
+  if (range.size() <= kLeaf) return fill_leaf(points, order, range);
+  const Split parted = split(points, order, range, depth, 1);
   if (!parted.is_parted()) return fill_leaf(points, order, range);
   return join(nodes, parted, [&](Range part) { return grow(points, order, part, depth + 1, nodes); });
 }
@@ -197,14 +208,17 @@ PointTree::Grown PointTree::fill_leaf(PointsView<Real> points, std::span<Placed>
   Bounds bounds;
   for (std::size_t i = range.begin; i < range.end; ++i) {
     rows_[i] = order[i].index;
-    points_[i] = points[rows_[i]] - centre_;
-    bounds.add(points_[i]);
+    const Vec3 p = points[rows_[i]] - centre_;
+    x_[i] = p.x, y_[i] = p.y, z_[i] = p.z;
   }
-  return {bounds, static_cast<std::uint32_t>(range.size())};
+  // A loop of its own: the one above waits for memory, and the shorter it is, the more points it waits for at once.
+  for (std::size_t i = range.begin; i < range.end; ++i) bounds.add({x_[i], y_[i], z_[i]});
+  return {bounds, true};
 }
 
 template <class Real>
-PointTree::PointTree(PointsView<Real> points, int threads) : points_(points.n), rows_(points.n) {
+PointTree::PointTree(PointsView<Real> points, int threads)
+    : x_(points.n + kOverrun), y_(points.n + kOverrun), z_(points.n + kOverrun), rows_(points.n) {
   if (points.n == 0) throw std::invalid_argument("a point tree needs at least one point");
   if (points.n > std::numeric_limits<std::uint32_t>::max()) throw std::invalid_argument("a point tree holds 2^32 points");
   const Bounds bounds = bounds_of(points.n, [&](std::size_t i) { return points[i]; }, threads);
@@ -218,7 +232,7 @@ PointTree::PointTree(PointsView<Real> points, int threads) : points_(points.n), 
   });
   const Range whole{0, points.n};
   std::vector<Split> splits;
-  sort_along_curve<Real>(points, order, threads);
+  sort_along_curve<Real>(points, order, bounds, threads);
   split_to_twigs<Real>(points, order, whole, 0, threads, splits);
 
   std::vector<Twig> twigs(splits.size());
@@ -234,57 +248,87 @@ PointTree::PointTree(PointsView<Real> points, int threads) : points_(points.n), 
     nodes_.insert(nodes_.end(), twigs[i].nodes.begin(), twigs[i].nodes.end());
     return twigs[i].root;
   };
-  join(nodes_, {whole, 0, 1, {whole}}, [&](Range) { return gather(gather); });
+  const Grown root = gather(gather);
+  if (root.is_leaf) join(nodes_, {whole, 0, 1, {whole}}, [&](Range) { return root; });
 }
 
 // ------------------------------------------------------------------------------------------------ asking
 
+// The least squared distance from the query to the points, or to some of the few behind them.
+inline double PointTree::least_squared(Vec3 query, std::size_t begin, std::size_t end) const {
+  using Pair = Lanes<double>;
+  const Pair x = Pair::all(query.x), y = Pair::all(query.y), z = Pair::all(query.z);
+  Pair least = Pair::all(std::numeric_limits<double>::infinity());
+  for (std::size_t i = begin; i < end; i += 4)
+    for (std::size_t j = i; j < i + 4; j += Pair::kCount) {
+      const Pair dx = Pair::load(&x_[j]) - x, dy = Pair::load(&y_[j]) - y, dz = Pair::load(&z_[j]) - z;
+      least = min(dx * dx + dy * dy + dz * dz, least);
+    }
+  return std::min(least.v[0], least.v[1]);
+}
+
 template <class Collector>
 void PointTree::visit(Vec3 query, Collector& collector) const {
-  struct Branch {
-    float squared;
-    std::uint32_t child, count;
+  const Vec3 scaled{query.x / unit_, query.y / unit_, query.z / unit_};
+  const Four q[3] = {Four::all(static_cast<float>(scaled.x)), Four::all(static_cast<float>(scaled.y)),
+                     Four::all(static_cast<float>(scaled.z))};
+  // Boxes (at most 1 in size) and query are rounded to 6e-8 of their size: with more allowed, none is taken for too far.
+  const double slack = 2e-7 * (1 + std::max({std::abs(scaled.x), std::abs(scaled.y), std::abs(scaled.z)}));
+  const auto limit = [&] {
+    const double radius = std::sqrt(collector.bound()) / unit_ + slack;
+    return static_cast<float>(radius * radius * (1 + 1e-6));  // and for the rounding of the sum
   };
-  const float q[3] = {static_cast<float>(query.x / unit_), static_cast<float>(query.y / unit_),
-                      static_cast<float>(query.z / unit_)};
-  // Boxes (at most 1 in size) and query are rounded to 6e-8 of their size: widened by more, none is taken for too far.
-  const float slack = 2e-7f * (1 + std::max({std::abs(q[0]), std::abs(q[1]), std::abs(q[2])}));
-  const double per_unit = (1 + 1e-6) / (unit_ * unit_);  // and the rounding of the sum
-  constexpr double farthest = std::numeric_limits<float>::max();  // a child that is not there lies beyond
-  const auto limit = [&] { return static_cast<float>(std::min(collector.bound() * per_unit, farthest)); };
-  Branch stack[kFan * (kDeepest + 2)];
+  float bound = limit();
+  // Children that wait: the squared distance's bits, which order as it does, over the place among all nodes' children.
+  std::uint64_t stack[kFan * (kDeepest + 2)];
   int top = 0;
-  for (Branch here{0, 0, 0};;) {
-    if (here.count) {
-      for (std::uint32_t i = here.child; i < here.child + here.count; ++i) {
-        const Vec3 d = points_[i] - query;
+  for (std::uint32_t at = 0;;) {
+    const Node& node = nodes_[at];
+    float squared[kFan];
+    unsigned near = 0;  // bit k: child k is within the bound
+    for (int half = 0; half < kFan / Four::kCount; ++half) {
+      Four sum = Four::all(0);
+      for (int axis = 0; axis < 3; ++axis) {
+        const Four outside = q[axis] - min(max(q[axis], node.lo[axis][half]), node.hi[axis][half]);
+        sum = sum + outside * outside;
+      }
+      sum.store(squared + half * Four::kCount);
+      near |= at_most(sum, bound) << half * Four::kCount;
+    }
+    // The nearest goes on top; to sort the others would take longer than it saves.
+    const auto next_near = [&] {
+      const auto k = static_cast<std::uint32_t>(std::countr_zero(near));
+      near &= near - 1;
+      return std::uint64_t{std::bit_cast<std::uint32_t>(squared[k])} << 32 | (at * kFan + k);
+    };
+    if (near) {
+      std::uint64_t nearest = next_near();
+      while (near) {
+        const std::uint64_t child = next_near();
+        const std::uint64_t nearer = std::min(nearest, child);
+        stack[top++] = nearest ^ child ^ nearer;  // the other: written as a maximum, compilers make it a branch
+        nearest = nearer;
+      }
+      stack[top++] = nearest;
+    }
+    for (;;) {
+      if (top == 0) return;
+      const std::uint64_t next = stack[--top];
+      if (std::bit_cast<float>(static_cast<std::uint32_t>(next >> 32)) > bound) continue;
+      const auto place = static_cast<std::uint32_t>(next);
+      const std::uint32_t parent = place / kFan, begin = nodes_[parent].begin[place % kFan];
+      const std::uint32_t end = nodes_[parent].end[place % kFan];
+      if (end == 0) {
+        at = parent + begin;
+        break;
+      }
+      if (!(least_squared(query, begin, end) < collector.bound())) continue;
+      for (std::uint32_t i = begin; i < end; ++i) {
+        const Vec3 d = local(i) - query;
         collector.offer(dot(d, d), i);
       }
-    } else {
-      const Node& node = nodes_[here.child];
-      Lanes squared{};
-      for (int axis = 0; axis < 3; ++axis) {
-        const Lanes below = Lanes::load(node.lo[axis]) - (q[axis] + slack);
-        const Lanes above = (q[axis] - slack) - Lanes::load(node.hi[axis]);
-        const Lanes outside = max(max(below, above), Lanes{});
-        squared = squared + outside * outside;
-      }
-      // Children wait on the stack with the nearest on top.
-      const float bound = limit();
-      const int bottom = top;
-      for (int k = 0; k < kFan; ++k) {
-        const float far = squared[k];
-        if (!(far <= bound)) continue;
-        int place = top++;
-        for (; place > bottom && stack[place - 1].squared < far; --place) stack[place] = stack[place - 1];
-        stack[place] = {far, node.count[k] ? node.child[k] : here.child + node.child[k], node.count[k]};
-      }
+      bound = limit();
     }
-    const float bound = limit();
-    do {
-      if (top == 0) return;
-      here = stack[--top];
-    } while (here.squared > bound);
   }
 }
 
