@@ -6,6 +6,7 @@
 
 #include "keypoints.hpp"
 #include "least_squares.hpp"
+#include "motion.hpp"
 #include "multiplicity.hpp"
 #include "point_field.hpp"
 #include "point_tree.hpp"
@@ -159,6 +160,20 @@ Array<double> transform_points(Square<3> R, Values t, Points<double> points) {
   return array(std::move(moved), {points.shape(0), 3});
 }
 
+Array<double> exponential(Values twist) {
+  if (twist.shape(0) != 6) throw std::invalid_argument("a twist has six entries");
+  const double* x = twist.data();
+  const auto T = exp_twist({x[0], x[1], x[2]}, {x[3], x[4], x[5]});
+  return array(std::vector<double>(T.begin(), T.end()), {4, 4});
+}
+
+Array<double> directions(Values value, Points<double> gradient) {
+  if (value.shape(0) != gradient.shape(0)) throw std::invalid_argument("value and gradient differ in length");
+  std::vector<double> unit(gradient.shape(0) * 3);
+  unit_rows(value.data(), gradient.data(), gradient.shape(0), unit.data());
+  return array(std::move(unit), {gradient.shape(0), 3});
+}
+
 Array<double> moments(Points<double> x, Points<double> g) {
   if (x.shape(0) != g.shape(0)) throw std::invalid_argument("x and g differ in length");
   std::vector<double> rows(x.shape(0) * 6);
@@ -242,6 +257,8 @@ NB_MODULE(_core, m) {
   m.def("thin", &thin_points<double>, "points"_a.noconvert(), "bounds"_a, "voxel"_a, "threads"_a,
         kThinDoc);
   m.def("transform", &transform_points, "R"_a, "t"_a, "points"_a, "R (3, 3) times each of points (n, 3), plus t (3,).");
+  m.def("exp_twist", &exponential, "twist"_a, "The motion (4, 4) that a twist (w, v) (6,) generates.");
+  m.def("directions", &directions, "value"_a, "gradient"_a, "Unit vectors (n, 3) away from the feet; zero without any.");
   m.def("moment_rows", &moments, "x"_a, "g"_a, "Rows (n, 6) of x cross g, then g, of x and g (n, 3).");
   m.def("direct", &direct, "J"_a, "r"_a, "The twist (6,) that minimises |J x + r|^2 over rows (n, 6), (n,).");
   m.def("reweighted", &reweighted, "J"_a, "r"_a, "w"_a, "floor"_a, "unit"_a, "tolerance"_a, "steps"_a,

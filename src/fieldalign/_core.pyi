@@ -43,6 +43,12 @@ def thin(points: Points, bounds: Floats, voxel: float, threads: int) -> tuple[Fl
 def transform(R: Floats, t: Floats, points: Floats) -> Floats:
     """R (3, 3) times each of points (n, 3), plus t (3,)."""
 
+def exp_twist(twist: Floats) -> Floats:
+    """The motion (4, 4) that a twist (w, v) (6,) generates."""
+
+def directions(value: Floats, gradient: Floats) -> Floats:
+    """Unit vectors (n, 3) away from the feet; zero where there is no gradient."""
+
 def moment_rows(x: Floats, g: Floats) -> Floats:
     """Rows (n, 6) of x cross g, then g, of x and g (n, 3)."""
 

@@ -17,6 +17,7 @@ from .result import Reason
 from .settings import Settings
 
 STILL = 1e-3  # of the extent: a last increment that moves some point further has not converged
+COARSE = 0.05  # of the smaller extent: places further apart are never the same, however sparse the points are
 MIN_OVERLAP = 0.2  # of either surface: with less, what agrees may be chance
 
 
@@ -41,7 +42,8 @@ def judge(alignment: Alignment, source: PreparedCloud, overlap: tuple[float, flo
 
 def overlaps(source: PreparedCloud, target: PreparedCloud, T_target_source: Floats) -> tuple[float, float]:
     """Share of the source's surface that lies on the target's, and of the target's that lies on the source's."""
-    near = source.probes[1] + target.probes[1] or STILL * min(source.extent, target.extent)
+    smaller = min(source.extent, target.extent)
+    near = min(source.probes[1] + target.probes[1] or STILL * smaller, COARSE * smaller)
 
     def share(of: PreparedCloud, on: PreparedCloud, T: Floats) -> float:
         distances = sampled(on.field, apply(T, of.probes[0])).value

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from .. import _core
 from ..fields.protocol import FieldSample, Floats
 
@@ -22,4 +24,4 @@ def jacobian(at_source: FieldSample, x: Floats) -> Floats:
 
 def row_dot(a: Floats, b: Floats) -> Floats:
     """Row by row dot product of (L, 3) arrays, (L,)."""
-    return a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]
+    return np.asarray(np.einsum("ij,ij->i", a, b))

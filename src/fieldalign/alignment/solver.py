@@ -53,18 +53,19 @@ def align(
     P_a = apply(inverse(in_target), pseudo)
     G_inv = inverse(inverse(in_target) @ T_start @ in_source)  # G^-1(xi): target -> source, both centred
     weights = np.full(len(pseudo), settings.unit**-2)  # 1 in the settings' unit, so that no other unit changes a bit
+    per_unit = np.array([1, 1, 1, *3 * [1 / settings.unit]])
     steps: list[Step] = []
     at_source = None
     for _ in range(settings.max_iterations):
         x = apply(G_inv, P_a)                                             # G^-1(xi_) P_a
-        at_source = sampled(source, x + centres[0], at_source)   # phi(P_S, G^-1(xi_) P_a), eq. (9)
+        at_source = sampled(source, x + centres[0], at_source)            # phi(P_S, G^-1(xi_) P_a), eq. (9)
         r = residual(at_source, target_features)                          # eq. (11)
         kept, strict = truncate(at_source, target_features, G_inv[:3, :3], settings)  # Sec. IV-D
-        J = jacobian(at_source, x)[kept]                                  # eq. (14), (15)
-        dx, weights[kept] = linear_step(J, r[kept], weights[kept], settings)  # eq. (16), Sec. IV-C
+        J, r = jacobian(at_source, x)[kept], r[kept]                      # eq. (14), (15)
+        dx, weights[kept] = linear_step(J, r, weights[kept], settings)    # eq. (16), Sec. IV-C
         G_inv = exp_twist(dx) @ G_inv
-        steps.append(Step(dx, float(np.abs(r[kept]).mean()), int(kept.sum())))
-        if np.linalg.norm(dx / [1, 1, 1, *3 * [settings.unit]]) < settings.tolerance:
+        steps.append(Step(dx, float(np.abs(r).mean()), len(r)))
+        if np.linalg.norm(dx * per_unit) < settings.tolerance:
             break
     G_inv[:3, :3] = nearest_rotation(G_inv[:3, :3])
     T = in_target @ inverse(G_inv) @ inverse(in_source)

@@ -45,7 +45,4 @@ def agreement(at_source: FieldSample, at_target: FieldSample, R: Floats, setting
         return np.ones(len(at_source.value))
     if settings.direction == "normals":  # the paper's words: the foot lies along the surface's normal
         return np.minimum(*(np.abs(row_dot(s.gradient, s.normal)) for s in (at_source, at_target)))
-    # Unit vectors away from the feet, the same for signed and unsigned fields; none on a surface itself.
-    cosine = row_dot(at_source.gradient, rotate(R, at_target.gradient)) * np.sign(at_source.value * at_target.value)
-    lengths = row_dot(at_source.gradient, at_source.gradient) * row_dot(at_target.gradient, at_target.gradient)
-    return np.asarray(cosine / np.sqrt(np.where(lengths > 0, lengths, np.inf)))
+    return row_dot(at_source.direction, rotate(R, at_target.direction))

@@ -55,6 +55,11 @@ class FieldSample:
         """How many of the places each one's foot serves, (L,); 1 where it is its own."""
         return _core.count_equal(np.ascontiguousarray(self.foot))
 
+    @cached_property
+    def direction(self) -> Floats:
+        """Unit vectors away from the feet, (L, 3), alike for signed and unsigned fields; zero on a surface itself."""
+        return _core.directions(np.ascontiguousarray(self.value), np.ascontiguousarray(self.gradient))
+
     def __iter__(self) -> Iterator[Floats]:
         return iter((self.value, self.gradient, self.foot, self.normal))
 
@@ -87,6 +92,8 @@ def sampled(field: DistanceField, x: Floats, last: FieldSample | None = None) ->
     guess = {} if last is None or last.place is None else {"guess": last.place}
     answer: Any = field.sample(x, **guess)
     sample = answer if isinstance(answer, FieldSample) else _from_tuple(field, answer)
+    if sample.place is not None:  # from the core, which needs no check
+        return sample
     for name, shape in (("value", (len(x),)), ("gradient", x.shape), ("foot", x.shape)):
         got = np.shape(getattr(sample, name))
         if got != shape:
