@@ -64,17 +64,19 @@ def certainty(at_source: FieldSample, pseudo: Floats, alignment: Alignment, r: F
     Gauss-Newton's J^T W J / s^2 over the kept pseudo points, s^2 = sum w r^2 / (n - 6), as if they were independent.
     """
     kept = alignment.kept
-    reference = pseudo[kept].mean(axis=0)
+    places = pseudo[kept]
+    reference = places.mean(axis=0)
+    places = places - reference
     R = alignment.T_target_source[:3, :3]
     gradient = rotate(R, (2 * at_source.value[:, None] * at_source.gradient)[kept])
-    J = _core.moment_rows(pseudo[kept] - reference, gradient)
+    J = _core.moment_rows(places, gradient)
     w = alignment.weights[kept]
     freedom = max(len(w) - 6, 1)
     # Copies of one cloud agree to the last bit: a resolution of float64 stands in for their noise.
     scale = float(np.max(at_source.value**2)) or 1.0
     variance = max(float((w * r[kept] ** 2).sum()) / freedom, w.mean() * (1e-12 * scale) ** 2)
     information = _core.information(J, w) / variance
-    length = float(np.sqrt(row_dot(pseudo[kept] - reference, pseudo[kept] - reference).mean()))
+    length = float(np.sqrt(row_dot(places, places).mean()))
     return _split(information, reference, length)
 
 

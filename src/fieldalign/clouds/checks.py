@@ -64,8 +64,8 @@ def _raise_not_finite(points: NDArray[Any], name: str) -> None:
 
 
 def _check_distinct(points: NDArray[Any], name: str) -> None:
-    """At least 3 distinct points; the first thousand nearly always hold them."""
-    for part in (points[:1000], points):
+    """At least 3 distinct points; the first hundred nearly always hold them."""
+    for part in (points[:100], points):
         others = part[(part != part[:1]).any(axis=1)]
         if len(others) and (others != others[0]).any():
             return

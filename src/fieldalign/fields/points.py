@@ -77,8 +77,11 @@ class PointField:
 
     def spacing(self, x: ArrayLike) -> Floats:
         """For points x (L, 3) of the cloud, the distance (L,) to the next point that is not the same place."""
-        distances, _ = self.nearest(x, min(4, len(self)))
-        apart = np.where(distances > 0, distances, np.inf).min(axis=1)
+        apart = self.nearest(x, 2)[0][:, -1]
+        same = np.flatnonzero(apart == 0)
+        if len(same):  # duplicated points: look further
+            further = self.nearest(np.asarray(x)[same], 16)[0]
+            apart[same] = np.where(further > 0, further, np.inf).min(axis=1)
         return np.where(np.isfinite(apart), apart, 0.0)
 
     def keypoints(self, gamma: float = 0.5, min_neighbours: int = 10) -> NDArray[np.uint32]:
