@@ -12,7 +12,6 @@ from fieldalign.alignment import Alignment, Step
 from fieldalign.fields import FieldSample, sampled
 from fieldalign.motions import apply, exp_twist, inverse, translation
 from fieldalign.prepared import prepare
-from fieldalign.settings import Settings
 from fieldalign.verdict import STILL, certainty, judge, overlaps, rmse
 
 
@@ -171,7 +170,7 @@ def test_rmse_is_of_the_kept_distances_and_takes_no_side():
 def known(field, T, pseudo, r, weights=None, kept=None):
     n = len(pseudo)
     found = alignment(T=T, kept=kept, weights=weights, n=n)
-    return certainty(sampled(field, apply(inverse(T), pseudo)), pseudo, found, r, Settings())
+    return certainty(sampled(field, apply(inverse(T), pseudo)), pseudo, found, r)
 
 
 @pytest.fixture

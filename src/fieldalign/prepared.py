@@ -70,13 +70,14 @@ class PreparedCloud:
         handed = None if settings.pseudo_points is None else np.asarray(settings.pseudo_points).tobytes()
         drawn = (settings.pseudo_set, settings.pseudo_count, settings.half_width, settings.spread, seed)
         key = (handed or drawn, settings.neighbours, settings.normal_neighbours)
-        if key not in self._features:
+        known = self._features.get(key)
+        if known is None:
             field = self.sampled_by(settings, threads)
             pseudo = draw_pseudo_points(field, self.centre, settings, seed)
-            while len(self._features) >= _KEPT:
-                self._features.pop(next(iter(self._features)), None)
-            self._features[key] = pseudo, sampled(field, pseudo)
-        return self._features[key]
+            known = pseudo, sampled(field, pseudo)
+            # A new dictionary, so that calls from several threads never see one change under them.
+            self._features = dict([*self._features.items(), (key, known)][-_KEPT:])
+        return known
 
 
 CloudLike: TypeAlias = ArrayLike | PointCloud | DistanceField | str | os.PathLike[str] | PreparedCloud

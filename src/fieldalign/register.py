@@ -63,7 +63,7 @@ def register(
     found = align(field, target_features, pseudo, T_start, (moving.centre, fixed.centre), chosen)
     clock.lap("align")
     at_source = sampled(field, apply(inverse(found.T_target_source), pseudo), found.at_source)
-    known = certainty(at_source, pseudo, found, residual(at_source, target_features), chosen)
+    known = certainty(at_source, pseudo, found, residual(at_source, target_features))
     overlap, overlap_target = overlaps(moving, fixed, found.T_target_source)
     reason = judge(found, moving, (overlap, overlap_target))
     clock.lap("judge")

@@ -14,7 +14,6 @@ from .fields.protocol import Floats
 from .motions import apply, inverse, rotate
 from .prepared import PreparedCloud
 from .result import Reason
-from .settings import Settings
 
 STILL = 1e-3  # of the extent: a last increment that moves some point further has not converged
 COARSE = 0.05  # of the smaller extent: places further apart are never the same, however sparse the points are
@@ -58,7 +57,7 @@ def rmse(at_source: FieldSample, at_target: FieldSample, alignment: Alignment) -
     return float(np.sqrt(np.mean(off**2)))
 
 
-def certainty(at_source: FieldSample, pseudo: Floats, alignment: Alignment, r: Floats, settings: Settings) -> Certainty:
+def certainty(at_source: FieldSample, pseudo: Floats, alignment: Alignment, r: Floats) -> Certainty:
     """Information of a left perturbation (w, v) in the target frame, from the residuals' own spread.
 
     Gauss-Newton's J^T W J / s^2 over the kept pseudo points, s^2 = sum w r^2 / (n - 6), as if they were independent.
