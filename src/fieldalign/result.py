@@ -27,8 +27,8 @@ class Reason(Enum):
 
 
 _SENTENCES = {
-    Reason.ACCEPTED: "Accepted: enough of the pseudo points remain, and the last step was small.",
-    Reason.LOW_OVERLAP: "Not accepted: too few pseudo points find the same surface in both clouds.",
+    Reason.ACCEPTED: "Accepted: enough of the pseudo points and of the surfaces agree, and the last step was small.",
+    Reason.LOW_OVERLAP: "Not accepted: too few pseudo points, or too little surface, agree in both clouds.",
     Reason.AMBIGUOUS: "Not accepted: another, clearly different pose agrees as well.",
     Reason.DEGENERATE: "Not accepted: the clouds may slide or turn on each other without a difference.",
     Reason.NOT_CONVERGED: "Not accepted: the last step was still large.",

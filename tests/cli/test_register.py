@@ -320,3 +320,19 @@ def test_as_a_program(scans):
         cwd=scans[0], capture_output=True, text=True,
     )
     assert is_one_error(ran.returncode, ran.stdout, ran.stderr)
+
+
+def test_a_warning_is_one_line(call):
+    far = np.load("target.npy").astype(np.float32) + np.float32(5e6)
+    np.save("far.npy", far)
+    status, out, err = call("register", "far.npy", "far.npy", "--json", "-")
+    assert status == 0
+    assert json.loads(out)["accepted"]
+    assert [line.split(":")[0] for line in err.splitlines()] == ["Warning", "Warning"]
+    assert "float32" in err
+
+
+def test_what_a_format_cannot_hold_is_told(call):
+    status, _, err = call("register", "source.ply", "target.npy", "--output", "moved.npy")
+    assert status == 0
+    assert err.startswith("Warning: moved.npy: .npy files have no place for")

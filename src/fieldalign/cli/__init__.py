@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import logging
 import sys
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
 
 import click
@@ -37,9 +41,10 @@ def cli() -> None:
 
 
 def main(args: list[str] | None = None) -> None:
-    """Runs a command; an error of the user is one line on stderr and exit status 1."""
+    """Runs a command; an error of the user is one line on stderr and exit status 1, a warning one line."""
     try:
-        status = cli.main(args=args, prog_name="fieldalign", standalone_mode=False)
+        with _one_line_warnings():
+            status = cli.main(args=args, prog_name="fieldalign", standalone_mode=False)
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.format_message())
         sys.exit(1)
@@ -50,6 +55,22 @@ def main(args: list[str] | None = None) -> None:
     except click.Abort:
         sys.exit(130)
     sys.exit(status or 0)
+
+
+@contextmanager
+def _one_line_warnings() -> Iterator[None]:
+    """What the library warns of or logs, as single lines on stderr while a command runs."""
+    handler = logging.StreamHandler()
+    handler.setFormatter(logging.Formatter("Warning: %(message)s"))
+    logger = logging.getLogger("fieldalign")
+    logger.addHandler(handler)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("default", UserWarning)
+            warnings.showwarning = lambda message, *_, **__: click.echo(f"Warning: {message}", err=True)
+            yield
+    finally:
+        logger.removeHandler(handler)
 
 
 def _fail(message: str) -> None:
