@@ -22,8 +22,7 @@ namespace {
 
 template <class Real>
 using Points = nb::ndarray<const Real, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
-template <int n>
-using Square = nb::ndarray<const double, nb::shape<n, n>, nb::c_contig, nb::device::cpu>;
+using Rotation = nb::ndarray<const double, nb::shape<3, 3>, nb::c_contig, nb::device::cpu>;
 using Rows6 = nb::ndarray<const double, nb::shape<-1, 6>, nb::c_contig, nb::device::cpu>;
 using Places = nb::ndarray<const std::uint32_t, nb::shape<-1>, nb::c_contig, nb::device::cpu>;
 using Values = nb::ndarray<const double, nb::shape<-1>, nb::c_contig, nb::device::cpu>;
@@ -75,7 +74,7 @@ auto nearest(const PointTree& tree, Points<double> queries, int k, int threads) 
     nb::gil_scoped_release free;
     parallel_blocks(n, 128, threads, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
-        KNearest found(tree, static_cast<int>(width));
+        KNearest found(tree, k);
         tree.visit(view(queries)[i] - tree.centre(), found);
         for (int j = 0; j < found.found; ++j) {
           distances[i * width + j] = std::sqrt(found.squared[j]);
@@ -153,7 +152,7 @@ auto thin_points(Points<Real> points, Points<double> bounds, double voxel, int t
   return std::make_pair(array(std::move(means), {n, 3}), array(std::move(thinned.first), {n}));
 }
 
-Array<double> transform_points(Square<3> R, Values t, Points<double> points) {
+Array<double> transform_points(Rotation R, Values t, Points<double> points) {
   if (t.shape(0) != 3) throw std::invalid_argument("t must have three entries");
   std::vector<double> moved(points.shape(0) * 3);
   transform(R.data(), t.data(), points.data(), points.shape(0), moved.data());
@@ -208,7 +207,7 @@ auto reweighted(Rows6 J, Values r, Values w, double floor, double unit, double t
 Array<double> information(Rows6 J, Values w) {
   check_rows(J.shape(0), {w.shape(0)});
   const std::vector<double> zeros(J.shape(0), 0);
-  const Square6 H = normal_equations(J.data(), zeros.data(), w.data(), J.shape(0)).H;
+  const Square<6> H = normal_equations(J.data(), zeros.data(), w.data(), J.shape(0)).H;
   std::vector<double> rows;
   for (const Twist& row : H) rows.insert(rows.end(), row.begin(), row.end());
   return array(std::move(rows), {6, 6});

@@ -22,7 +22,7 @@ inline std::vector<std::uint32_t> iss_keypoints(const PointTree& tree, const Iss
                     [&](std::uint32_t p) { scatter.add(tree.local(p) - here); }};
       tree.visit(here, within);
       if (scatter.n < s.min_neighbours) continue;
-      const auto values = eigen(scatter.covariance()).values;
+      const auto values = eigen<3>(scatter.covariance()).values;
       if (values[1] < s.gamma_21 * values[2] && values[0] < s.gamma_32 * values[1]) saliency[i] = values[0];
     }
   });

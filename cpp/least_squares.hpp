@@ -5,15 +5,15 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <vector>
+
+#include "symmetric_eigen.hpp"
 
 namespace fieldalign {
 
 using Twist = std::array<double, 6>;       // (w, v)
-using Square6 = std::array<Twist, 6>;
 
 struct NormalEquations {
-  Square6 H{};
+  Square<6> H{};
   Twist g{};
 };
 
@@ -31,39 +31,6 @@ inline NormalEquations normal_equations(const double* J, const double* r, const 
   return sums;
 }
 
-// Eigenvalues and, as columns, eigenvectors of a symmetric matrix, by Jacobi's rotations.
-struct Eigen6 {
-  Twist values;
-  Square6 vectors;
-};
-
-inline Eigen6 eigen(Square6 A) {
-  Square6 E{};
-  for (int i = 0; i < 6; ++i) E[i][i] = 1;
-  for (int sweep = 0; sweep < 50; ++sweep) {
-    double off = 0, diagonal = 0;
-    for (int p = 0; p < 6; ++p)
-      for (int q = 0; q < 6; ++q) (p == q ? diagonal : off) += A[p][q] * A[p][q];
-    if (off <= 1e-32 * diagonal) break;
-    for (int p = 0; p < 5; ++p)
-      for (int q = p + 1; q < 6; ++q) {
-        if (A[p][q] == 0) continue;
-        const double theta = (A[q][q] - A[p][p]) / (2 * A[p][q]);
-        const double t = (theta >= 0 ? 1 : -1) / (std::abs(theta) + std::sqrt(theta * theta + 1));
-        const double cosine = 1 / std::sqrt(t * t + 1), sine = t * cosine;
-        const auto turn = [&](double& u, double& v) {
-          const double old = u;
-          u = cosine * old - sine * v, v = sine * old + cosine * v;
-        };
-        for (int k = 0; k < 6; ++k) turn(A[k][p], A[k][q]);
-        for (int k = 0; k < 6; ++k) turn(A[p][k], A[q][k]), turn(E[k][p], E[k][q]);
-      }
-  }
-  Eigen6 result{{}, E};
-  for (int i = 0; i < 6; ++i) result.values[i] = A[i][i];
-  return result;
-}
-
 // x = -H^+ g: the pseudo-inverse, so that a direction without any information gets no step. Rotations and translations
 // are brought to one size first, so that the unit of length does not decide what counts as no information.
 inline Twist solve(const NormalEquations& sums) {
@@ -71,14 +38,13 @@ inline Twist solve(const NormalEquations& sums) {
   const double turn = H[0][0] + H[1][1] + H[2][2], shift = H[3][3] + H[4][4] + H[5][5];
   const double length = turn > 0 && shift > 0 ? std::sqrt(turn / shift) : 1;
   const Twist scale = {1, 1, 1, length, length, length};
-  Square6 scaled;
+  Square<6> scaled;
   for (int a = 0; a < 6; ++a)
     for (int b = 0; b < 6; ++b) scaled[a][b] = scale[a] * H[a][b] * scale[b];
-  const Eigen6 parts = eigen(scaled);
-  const double largest = *std::max_element(parts.values.begin(), parts.values.end());
+  const Eigen<6> parts = eigen<6>(scaled);
   Twist x{};
   for (int k = 0; k < 6; ++k) {
-    if (!(parts.values[k] > 1e-13 * largest)) continue;
+    if (!(parts.values[k] > 1e-13 * parts.values[5])) continue;
     double along = 0;
     for (int a = 0; a < 6; ++a) along += parts.vectors[a][k] * scale[a] * sums.g[a];
     for (int a = 0; a < 6; ++a) x[a] -= scale[a] * parts.vectors[a][k] * along / parts.values[k];

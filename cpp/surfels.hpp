@@ -15,8 +15,8 @@ void plane_normals(const PointTree& tree, PointsView<Real> queries, int k, int t
       tree.visit(query, nearest);
       Scatter scatter;
       for (int j = 0; j < nearest.found; ++j) scatter.add(tree.local(nearest.position[j]) - query);
-      const Vec3 normal = eigen(scatter.covariance()).vectors[0];
-      normals[3 * i] = normal.x, normals[3 * i + 1] = normal.y, normals[3 * i + 2] = normal.z;
+      const auto axes = eigen<3>(scatter.covariance()).vectors;
+      for (int a = 0; a < 3; ++a) normals[3 * i + a] = axes[a][0];
     }
   });
 }

@@ -3,8 +3,8 @@
 
 #include <stdexcept>
 
-#include "points_view.hpp"
 #include "radix_sort.hpp"
+#include "survey.hpp"
 
 namespace fieldalign {
 
@@ -26,9 +26,8 @@ Thinned thin(PointsView<Real> points, Vec3 lo, Vec3 hi, double voxel, int thread
   };
   const Vec3 extent = hi - lo;
   const int bx = width(extent.x), by = width(extent.y), bz = width(extent.z);
-  constexpr std::size_t block = 16384;
   std::vector<Keyed<std::uint64_t>> order(points.n);
-  parallel_blocks(points.n, block, threads, [&](std::size_t begin, std::size_t end) {
+  parallel_blocks(points.n, kPointBlock, threads, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const Vec3 p = points[i] - lo;
       const auto cell = [&](double offset) { return static_cast<std::uint64_t>(offset / voxel); };

@@ -1,9 +1,10 @@
-// Vectors of three, and the eigen-decomposition of a symmetric 3 x 3 matrix.
+// Vectors of three, and how points scatter.
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+
+#include "symmetric_eigen.hpp"
 
 namespace fieldalign {
 
@@ -31,53 +32,12 @@ struct Scatter {
     xx += p.x * p.x, xy += p.x * p.y, xz += p.x * p.z;
     yy += p.y * p.y, yz += p.y * p.z, zz += p.z * p.z;
   }
-  // Covariance, upper triangle by rows: xx xy xz yy yz zz.
-  std::array<double, 6> covariance() const {
+  Square<3> covariance() const {
     const Vec3 m = (1 / n) * sum;
-    return {xx / n - m.x * m.x, xy / n - m.x * m.y, xz / n - m.x * m.z,
-            yy / n - m.y * m.y, yz / n - m.y * m.z, zz / n - m.z * m.z};
+    const double a = xx / n - m.x * m.x, b = xy / n - m.x * m.y, c = xz / n - m.x * m.z;
+    const double d = yy / n - m.y * m.y, e = yz / n - m.y * m.z, f = zz / n - m.z * m.z;
+    return {{{a, b, c}, {b, d, e}, {c, e, f}}};
   }
 };
-
-struct Eigen3 {
-  std::array<double, 3> values;   // ascending
-  std::array<Vec3, 3> vectors;    // unit length, in the order of the values
-};
-
-// Jacobi's rotations: slower than the closed form, but right for nearly equal eigenvalues, which planes and lines have.
-inline Eigen3 eigen(const std::array<double, 6>& c) {
-  double A[3][3] = {{c[0], c[1], c[2]}, {c[1], c[3], c[4]}, {c[2], c[4], c[5]}};
-  double E[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-  for (int sweep = 0; sweep < 30; ++sweep) {
-    const double off = A[0][1] * A[0][1] + A[0][2] * A[0][2] + A[1][2] * A[1][2];
-    const double diagonal = A[0][0] * A[0][0] + A[1][1] * A[1][1] + A[2][2] * A[2][2];
-    if (off <= 1e-32 * diagonal) break;
-    for (int p = 0; p < 2; ++p)
-      for (int q = p + 1; q < 3; ++q) {
-        if (A[p][q] == 0) continue;
-        const double theta = (A[q][q] - A[p][p]) / (2 * A[p][q]);
-        const double t = (theta >= 0 ? 1 : -1) / (std::abs(theta) + std::sqrt(theta * theta + 1));
-        const double cosine = 1 / std::sqrt(t * t + 1), sine = t * cosine;
-        for (int k = 0; k < 3; ++k) {
-          const double u = A[k][p], v = A[k][q];
-          A[k][p] = cosine * u - sine * v, A[k][q] = sine * u + cosine * v;
-        }
-        for (int k = 0; k < 3; ++k) {
-          const double u = A[p][k], v = A[q][k];
-          A[p][k] = cosine * u - sine * v, A[q][k] = sine * u + cosine * v;
-          const double e = E[k][p], f = E[k][q];
-          E[k][p] = cosine * e - sine * f, E[k][q] = sine * e + cosine * f;
-        }
-      }
-  }
-  std::array<int, 3> rank = {0, 1, 2};
-  std::sort(rank.begin(), rank.end(), [&](int a, int b) { return A[a][a] < A[b][b]; });
-  Eigen3 result;
-  for (int i = 0; i < 3; ++i) {
-    result.values[i] = A[rank[i]][rank[i]];
-    result.vectors[i] = {E[0][rank[i]], E[1][rank[i]], E[2][rank[i]]};
-  }
-  return result;
-}
 
 }  // namespace fieldalign

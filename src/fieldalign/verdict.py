@@ -8,7 +8,7 @@ import numpy as np
 
 from . import _core
 from .alignment import Alignment
-from .alignment.residual import row_dot
+from .alignment.residual import feature_gradient, row_dot
 from .fields import FieldSample, sampled
 from .fields.protocol import Floats
 from .motions import apply, inverse, rotate
@@ -67,7 +67,7 @@ def certainty(at_source: FieldSample, pseudo: Floats, alignment: Alignment, r: F
     reference = places.mean(axis=0)
     places = places - reference
     R = alignment.T_target_source[:3, :3]
-    gradient = rotate(R, (2 * at_source.value[:, None] * at_source.gradient)[kept])
+    gradient = rotate(R, feature_gradient(at_source)[kept])
     J = _core.moment_rows(places, gradient)
     w = alignment.weights[kept]
     freedom = max(len(w) - 6, 1)

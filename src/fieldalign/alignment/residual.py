@@ -16,10 +16,15 @@ def residual(at_source: FieldSample, at_target: FieldSample) -> Floats:
 def jacobian(at_source: FieldSample, x: Floats) -> Floats:
     """J (L, 6) at the pseudo points x (L, 3) in the source's frame, for a twist (w, v) on their left (paper eq. 14).
 
-    A row is the field's gradient, 2 (x - p) (eq. 15), times the warp Jacobian [-[x]_x, I] of a moved point; J is L x 6
+    A row is the feature's gradient (eq. 15) times the warp Jacobian [-[x]_x, I] of a moved point; J is L x 6
     and never the L x 3 x L of the text, since each feature belongs to one pseudo point.
     """
-    return _core.moment_rows(x, 2 * at_source.value[:, None] * at_source.gradient)
+    return _core.moment_rows(x, feature_gradient(at_source))
+
+
+def feature_gradient(at_source: FieldSample) -> Floats:
+    """Gradient of phi, the squared distance, (L, 3): 2 (x - p) (paper eq. 15)."""
+    return np.asarray(2 * at_source.value[:, None] * at_source.gradient)
 
 
 def row_dot(a: Floats, b: Floats) -> Floats:

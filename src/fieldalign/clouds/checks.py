@@ -33,10 +33,12 @@ def checked_points(values: ArrayLike, name: str, threads: int, drop_nan: bool = 
     drop_nan: rows with NaN are missing returns, left out and counted. Raises ArgumentError that names the argument
     where anything else is wrong; warns where float32 has already lost precision.
     """
-    given = as_points(values, name)
-    points = without_missing(given, name, threads) if drop_nan else given
-    _check_distinct(points, name)
+    given = points = as_points(values, name)
     bounds, mean = _core.survey(points, threads)
+    if drop_nan and not np.isfinite(mean).all():
+        points = without_missing(given, name, threads)
+        bounds, mean = _core.survey(points, threads)
+    _check_distinct(points, name)
     if not np.isfinite(mean).all():
         _raise_not_finite(points, name)
     largest = float(np.abs(bounds).max())

@@ -32,9 +32,7 @@ class PointField:
     def __init__(
         self, points: ArrayLike | Checked, neighbours: int = 1, normal_neighbours: int = 10, threads: int | None = None
     ) -> None:
-        self.neighbours = as_count(neighbours, "neighbours", 1, MAX_NEIGHBOURS)
-        self.normal_neighbours = as_count(normal_neighbours, "normal_neighbours", 3, MAX_NEIGHBOURS)
-        self.threads = resolve_threads(threads)
+        self._choose(neighbours, normal_neighbours, threads)
         checked = points if isinstance(points, Checked) else checked_points(points, "points", self.threads)
         self.points, self.bounds, self.centre = checked.points, checked.bounds, checked.mean
         self._tree = _core.PointTree(self.points, self.threads)
@@ -45,10 +43,13 @@ class PointField:
     def using(self, neighbours: int, normal_neighbours: int, threads: int | None) -> PointField:
         """The same points under other settings; the tree is shared."""
         other = copy.copy(self)
-        other.neighbours = as_count(neighbours, "neighbours", 1, MAX_NEIGHBOURS)
-        other.normal_neighbours = as_count(normal_neighbours, "normal_neighbours", 3, MAX_NEIGHBOURS)
-        other.threads = resolve_threads(threads)
+        other._choose(neighbours, normal_neighbours, threads)
         return other
+
+    def _choose(self, neighbours: int, normal_neighbours: int, threads: int | None) -> None:
+        self.neighbours = as_count(neighbours, "neighbours", 1, MAX_NEIGHBOURS)
+        self.normal_neighbours = as_count(normal_neighbours, "normal_neighbours", 3, MAX_NEIGHBOURS)
+        self.threads = resolve_threads(threads)
 
     def sample(self, x: ArrayLike, guess: NDArray[np.uint32] | None = None) -> FieldSample:
         """The field at the places x (L, 3): value, gradient, foot and normal.
