@@ -1,45 +1,29 @@
 // What Python sees of the native core. Shapes are checked here, meaning in Python; the interpreter is free meanwhile.
-#include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 
+#include "arrays.hpp"
 #include "keypoints.hpp"
 #include "least_squares.hpp"
 #include "motion.hpp"
 #include "multiplicity.hpp"
+#include "occupancy.hpp"
 #include "point_field.hpp"
 #include "point_tree.hpp"
 #include "rows.hpp"
 #include "surfels.hpp"
 #include "thinning.hpp"
 
-namespace nb = nanobind;
-using namespace nb::literals;
+using namespace nanobind::literals;
 using namespace fieldalign;
 
 namespace {
 
-template <class Real>
-using Points = nb::ndarray<const Real, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 using Rotation = nb::ndarray<const double, nb::shape<3, 3>, nb::c_contig, nb::device::cpu>;
 using Rows6 = nb::ndarray<const double, nb::shape<-1, 6>, nb::c_contig, nb::device::cpu>;
-using Places = nb::ndarray<const std::uint32_t, nb::shape<-1>, nb::c_contig, nb::device::cpu>;
-using Values = nb::ndarray<const double, nb::shape<-1>, nb::c_contig, nb::device::cpu>;
-template <class T>
-using Array = nb::ndarray<nb::numpy, T>;
 
-template <class Real>
-PointsView<Real> view(const Points<Real>& points) {
-  return {points.data(), points.shape(0)};
-}
-
-// A NumPy array that owns what `values` held.
-template <class T>
-Array<T> array(std::vector<T>&& values, std::initializer_list<std::size_t> shape) {
-  auto* kept = new std::vector<T>(std::move(values));
-  nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<std::vector<T>*>(p); });
-  return Array<T>(kept->data(), shape, owner);
+Array<double> bounds_array(const Bounds& b) {
+  return array(std::vector<double>{b.lo.x, b.lo.y, b.lo.z, b.hi.x, b.hi.y, b.hi.z}, {2, 3});
 }
 
 int checked_neighbours(int k) {
@@ -60,9 +44,8 @@ auto survey_points(Points<Real> points, int threads) {
     nb::gil_scoped_release free;
     all = survey(points.shape(0), [all_points = view(points)](std::size_t i) { return all_points[i]; }, threads);
   }
-  const auto [lo, hi] = all.bounds;
   const Vec3 mean = (1.0 / static_cast<double>(points.shape(0))) * all.sum;
-  return std::make_pair(array(std::vector<double>{lo.x, lo.y, lo.z, hi.x, hi.y, hi.z}, {2, 3}),
+  return std::make_pair(bounds_array(all.bounds),
                         array(std::vector<double>{mean.x, mean.y, mean.z}, {3}));
 }
 
@@ -116,15 +99,21 @@ nb::tuple sample(const PointTree& tree, Points<double> queries, int k, std::opti
                         array(std::move(foot), {n, 3}), array(std::move(place), {n}));
 }
 
-Array<double> normals(const PointTree& tree, Points<double> queries, int k, int threads) {
+// Means and normals (n, 3) of the planes through the k nearest points, and their thickness and width (n, 2).
+nb::tuple surfels(const PointTree& tree, Points<double> queries, int k, int threads) {
   const std::size_t n = queries.shape(0);
   checked_neighbours(k);
-  std::vector<double> result(3 * n);
+  std::vector<double> means(3 * n), normals(3 * n), spread(2 * n);
   {
     nb::gil_scoped_release free;
-    plane_normals(tree, view(queries), k, threads, result.data());
+    fit_surfels(tree, view(queries), k, threads, [&](std::size_t i, const Surfel& s) {
+      const Vec3 mean = s.mean + tree.centre();
+      for (int a = 0; a < 3; ++a) means[3 * i + a] = mean[a], normals[3 * i + a] = s.normal[a];
+      spread[2 * i] = s.thickness, spread[2 * i + 1] = s.width;
+    });
   }
-  return array(std::move(result), {n, 3});
+  return nb::make_tuple(array(std::move(means), {n, 3}), array(std::move(normals), {n, 3}),
+                        array(std::move(spread), {n, 2}));
 }
 
 Array<std::uint32_t> keypoints(const PointTree& tree, double salient_radius, double non_max_radius, double gamma_21,
@@ -139,7 +128,7 @@ Array<std::uint32_t> keypoints(const PointTree& tree, double salient_radius, dou
 }
 
 template <class Real>
-auto thin_points(Points<Real> points, Points<double> bounds, double voxel, int threads) {
+nb::tuple thin_points(Points<Real> points, Points<double> bounds, double voxel, int threads) {
   Thinned thinned;
   {
     nb::gil_scoped_release free;
@@ -149,7 +138,19 @@ auto thin_points(Points<Real> points, Points<double> bounds, double voxel, int t
   std::vector<double> means(3 * n);
   for (std::size_t i = 0; i < n; ++i)
     means[3 * i] = thinned.means[i].x, means[3 * i + 1] = thinned.means[i].y, means[3 * i + 2] = thinned.means[i].z;
-  return std::make_pair(array(std::move(means), {n, 3}), array(std::move(thinned.first), {n}));
+  return nb::make_tuple(array(std::move(means), {n, 3}), array(std::move(thinned.first), {n}),
+                        array(std::move(thinned.count), {n}));
+}
+
+template <class Real>
+nb::tuple occupancy_of(Points<Real> points, std::size_t most, int threads) {
+  Occupancy found;
+  {
+    nb::gil_scoped_release free;
+    found = occupancy(view(points), most, threads);
+  }
+  return nb::make_tuple(bounds_array(found.core), found.edge, array(std::vector<double>(found.shared.begin(), found.shared.end()), {kHalvings}),
+                        array(std::vector<double>(found.company.begin(), found.company.end()), {kHalvings}));
 }
 
 Array<double> transform_points(Rotation R, Values t, Points<double> points) {
@@ -185,12 +186,12 @@ void check_rows(std::size_t n, std::initializer_list<std::size_t> others) {
     if (other != n) throw std::invalid_argument("J, r and w differ in length");
 }
 
-Array<double> array(const Twist& x) { return array(std::vector<double>(x.begin(), x.end()), {6}); }
+Array<double> twist_array(const Twist& x) { return array(std::vector<double>(x.begin(), x.end()), {6}); }
 
 Array<double> direct(Rows6 J, Values r) {
   check_rows(J.shape(0), {r.shape(0)});
   const std::vector<double> ones(J.shape(0), 1);
-  return array(solve(normal_equations(J.data(), r.data(), ones.data(), J.shape(0))));
+  return twist_array(solve(normal_equations(J.data(), r.data(), ones.data(), J.shape(0))));
 }
 
 auto reweighted(Rows6 J, Values r, Values w, double floor, double unit, double tolerance, int steps) {
@@ -201,7 +202,7 @@ auto reweighted(Rows6 J, Values r, Values w, double floor, double unit, double t
     nb::gil_scoped_release free;
     x = reweighted_solution(J.data(), r.data(), weights.data(), J.shape(0), {floor, unit, tolerance, steps});
   }
-  return std::make_pair(array(x), array(std::move(weights), {w.shape(0)}));
+  return std::make_pair(twist_array(x), array(std::move(weights), {w.shape(0)}));
 }
 
 Array<double> information(Rows6 J, Values w) {
@@ -229,9 +230,16 @@ Array<std::uint32_t> rows_along_curve(const PointTree& tree, Places places) {
 
 constexpr const char* kSurveyDoc =
     "Lowest and highest corner (2, 3) and mean (3,) of points (n, 3); the mean is not finite where a coordinate is not.";
-constexpr const char* kThinDoc = "Mean (m, 3) and first row (m,) of the points of each occupied voxel.";
+constexpr const char* kOccupancyDoc =
+    "A box (2, 3) around the points but for far outliers, the edge of a cell around it, and for its k-th halving: how many\n"
+    "cells hold two points or more (20,), and which share of the points they hold (20,). Of at most `most` points.";
+constexpr const char* kThinDoc = "Mean (m, 3), first row (m,) and number (m,) of the points of each occupied voxel.";
 
 }  // namespace
+
+namespace fieldalign {
+void bind_search(nb::module_& m);
+}
 
 NB_MODULE(_core, m) {
   m.doc() = "The native core of fieldalign: what loops over points.";
@@ -244,8 +252,9 @@ NB_MODULE(_core, m) {
       .def("sample", &sample, "queries"_a, "neighbours"_a, "guess"_a.none(), "threads"_a,
            "value (n,), gradient (n, 3), foot (n, 3) and its place (n,) of the field of mean distance to the k nearest\n"
            "points; a place of an earlier sample, given as a guess, changes nothing but the time.")
-      .def("normals", &normals, "queries"_a, "neighbours"_a, "threads"_a,
-           "Unit normals (n, 3) of the planes through the k nearest points.")
+      .def("surfels", &surfels, "queries"_a, "neighbours"_a, "threads"_a,
+           "Means (n, 3) and unit normals (n, 3) of the planes through the k nearest points, and standard deviations\n"
+           "(n, 2) across the plane and along its shorter axis.")
       .def("rows", &rows_along_curve, "places"_a, "Rows (n,) of places (n,) along the tree's curve.")
       .def("keypoints", &keypoints, "salient_radius"_a, "non_max_radius"_a, "gamma_21"_a, "gamma_32"_a,
            "min_neighbours"_a, "threads"_a, "Rows of the ISS keypoints, ascending.");
@@ -255,6 +264,8 @@ NB_MODULE(_core, m) {
         kThinDoc);
   m.def("thin", &thin_points<double>, "points"_a.noconvert(), "bounds"_a, "voxel"_a, "threads"_a,
         kThinDoc);
+  m.def("occupancy", &occupancy_of<float>, "points"_a.noconvert(), "most"_a, "threads"_a, kOccupancyDoc);
+  m.def("occupancy", &occupancy_of<double>, "points"_a.noconvert(), "most"_a, "threads"_a, kOccupancyDoc);
   m.def("transform", &transform_points, "R"_a, "t"_a, "points"_a, "R (3, 3) times each of points (n, 3), plus t (3,).");
   m.def("exp_twist", &exponential, "twist"_a, "The motion (4, 4) that a twist (w, v) (6,) generates.");
   m.def("directions", &directions, "value"_a, "gradient"_a, "Unit vectors (n, 3) away from the feet; zero without any.");
@@ -263,5 +274,6 @@ NB_MODULE(_core, m) {
   m.def("reweighted", &reweighted, "J"_a, "r"_a, "w"_a, "floor"_a, "unit"_a, "tolerance"_a, "steps"_a,
         "The twist (6,) that minimises sum |J x + r|, and the weights (n,) it ends with.");
   m.def("information", &information, "J"_a, "w"_a, "sum w J^T J (6, 6), over rows (n, 6), (n,).");
+  bind_search(m);
   m.def("count_equal", &count_equal, "points"_a, "For each point (n, 3), how many of them equal it.");
 }

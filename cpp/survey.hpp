@@ -16,6 +16,10 @@ struct Bounds {
   void add(Vec3 p) { lo = smaller(lo, p), hi = larger(hi, p); }
 };
 
+inline bool contains(const Bounds& b, Vec3 p) {
+  return p.x >= b.lo.x && p.y >= b.lo.y && p.z >= b.lo.z && p.x <= b.hi.x && p.y <= b.hi.y && p.z <= b.hi.z;
+}
+
 inline Bounds merged(const Bounds& a, const Bounds& b) { return {smaller(a.lo, b.lo), larger(a.hi, b.hi)}; }
 
 struct Survey {

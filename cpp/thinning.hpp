@@ -11,6 +11,7 @@ namespace fieldalign {
 struct Thinned {
   std::vector<Vec3> means;            // of the points of each voxel
   std::vector<std::uint32_t> first;   // the lowest row of each voxel
+  std::vector<std::uint32_t> count;   // how many points it holds
 };
 
 // Voxels of edge `voxel` whose lattice begins at the points' own lower corner `lo`, so that a shifted cloud is thinned
@@ -35,15 +36,27 @@ Thinned thin(PointsView<Real> points, Vec3 lo, Vec3 hi, double voxel, int thread
     }
   });
   radix_sort<std::uint64_t>(order, bx + by + bz, threads);
-  Thinned result;
-  for (std::size_t i = 0; i < order.size();) {
-    Vec3 sum;
-    const std::size_t begin = i;
-    for (; i < order.size() && order[i].key == order[begin].key; ++i) sum = sum + (points[order[i].index] - lo);
-    result.means.push_back(lo + (1.0 / static_cast<double>(i - begin)) * sum);
-    result.first.push_back(order[begin].index);
+  std::vector<Thinned> parts((order.size() + kPointBlock - 1) / kPointBlock);
+  parallel_blocks(order.size(), kPointBlock, threads, [&](std::size_t begin, std::size_t end) {
+    Thinned& part = parts[begin / kPointBlock];
+    std::size_t i = begin;
+    while (i > 0 && i < end && order[i].key == order[i - 1].key) ++i;  // a voxel belongs to the block it begins in
+    while (i < end) {
+      Vec3 sum;
+      const std::size_t first = i;
+      for (; i < order.size() && order[i].key == order[first].key; ++i) sum = sum + (points[order[i].index] - lo);
+      part.means.push_back(lo + (1.0 / static_cast<double>(i - first)) * sum);
+      part.first.push_back(order[first].index);
+      part.count.push_back(static_cast<std::uint32_t>(i - first));
+    }
+  });
+  Thinned all;
+  for (const Thinned& part : parts) {
+    all.means.insert(all.means.end(), part.means.begin(), part.means.end());
+    all.first.insert(all.first.end(), part.first.begin(), part.first.end());
+    all.count.insert(all.count.end(), part.count.begin(), part.count.end());
   }
-  return result;
+  return all;
 }
 
 }  // namespace fieldalign

@@ -1,4 +1,4 @@
-"""One map, many scans: the map's field and its pseudo points are worked out once and kept."""
+"""One map, many scans: what the map is made into is worked out once and kept."""
 
 import numpy as np
 
@@ -11,5 +11,5 @@ rng = np.random.default_rng(0)
 
 for part in range(3):
     source = scans.source[rng.random(len(scans.source)) < 0.5]  # another scan of the same place
-    result = fa.register(source, target, settings="indoor-dense")
+    result = fa.register(source, target)
     print(f"scan {part}: {result.reason.value}, {sum(result.seconds.values()) * 1e3:.0f} ms")

@@ -33,6 +33,6 @@ T_scan_box[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(an
 T_scan_box[:3, 3] = 0.1, -0.05, 0.02
 scan = fa.PointCloud(on_box).transformed(T_scan_box)
 
-result = fa.register(Box(), scan, settings=fa.PRESETS["indoor"].scaled(0.3))
+result = fa.register(Box(), scan, method="paper", settings=fa.PRESETS["indoor"].scaled(0.3))
 print(result.reason)
 print("largest error of the pose:", np.abs(result.T_target_source - T_scan_box).max().round(4))

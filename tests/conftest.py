@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import os
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from fieldalign.motions import exp_twist
+import fieldalign as fa
+from fieldalign.motions import apply, exp_twist
 
 DATA = Path(os.environ.get("FIELDALIGN_DATA", Path(__file__).parents[2] / "shared" / "data"))
 
@@ -54,3 +56,29 @@ def motion():
         return T
 
     return make
+
+
+@pytest.fixture(scope="session")
+def any_motion():
+    """Makes a random motion (4, 4): a rotation from all of SO(3) alike, and the length of the shift."""
+
+    def make(rng: np.random.Generator, shift: float) -> np.ndarray:
+        T, step = np.eye(4), rng.normal(size=3)
+        T[:3, :3] = Rotation.random(random_state=rng).as_matrix()
+        T[:3, 3] = shift * step / np.linalg.norm(step)
+        return T
+
+    return make
+
+
+@pytest.fixture
+def pair(corner, motion, rng):
+    """Two copies of the corner, 30 degrees and half a metre apart, and the motion between them."""
+    T = motion(rng, 30, 0.5)
+    return corner, apply(T, corner), T
+
+
+@pytest.fixture(params=["robust", "paper"])
+def register(request):
+    """fa.register, by either method."""
+    return partial(fa.register, method=request.param)

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
-from scipy.spatial.transform import RigidTransform
+from scipy.spatial.transform import RigidTransform, Rotation
 
 from fieldalign.errors import ArgumentError
-from fieldalign.motions import apply, as_rigid, exp_twist, inverse, nearest_rotation, translation
+from fieldalign.motions import adjoint, apply, as_rigid, exp_twist, inverse, nearest_rotation, rotate, translation
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-7, 9.9e-5, 1.01e-4, 1e-2, 1.0, 3.1, np.pi, 5.0])
@@ -24,6 +24,27 @@ def test_apply_moves_points(rng):
     assert np.array_equal(apply(translation([1, 2, 3]), np.zeros((1, 3))), [[1, 2, 3]])
 
 
+def test_rotate_turns_and_does_not_shift(rng):
+    T, vectors = exp_twist(rng.normal(size=6)), rng.normal(size=(50, 3))
+    assert np.allclose(rotate(T[:3, :3], vectors), vectors @ T[:3, :3].T, atol=1e-15)
+
+
+@pytest.mark.parametrize("far", [1.0, 1e3])
+@pytest.mark.parametrize("angle", [0.0, 1e-5, 1.0, 3.0])
+def test_adjoint_carries_twists_across(rng, angle, far):
+    """T Exp(x) T^-1 = Exp(Ad x)."""
+    w = rng.normal(size=3)
+    T = exp_twist(np.r_[angle * w / np.linalg.norm(w), far * rng.normal(size=3)])
+    for x in (*np.eye(6), rng.normal(size=6)):
+        assert np.allclose(exp_twist(adjoint(T) @ x), T @ exp_twist(x) @ inverse(T), rtol=0, atol=1e-12 * far)
+
+
+def test_adjoints_compose_as_motions_do(rng):
+    A, B = exp_twist(rng.normal(size=6)), exp_twist(rng.normal(size=6))
+    assert np.allclose(adjoint(A @ B), adjoint(A) @ adjoint(B), atol=1e-13)
+    assert np.allclose(adjoint(inverse(A)), np.linalg.inv(adjoint(A)), atol=1e-13)
+
+
 def test_nearest_rotation_cleans_rounding(rng):
     R = exp_twist(rng.normal(size=6))[:3, :3]
     cleaned = nearest_rotation(R + 1e-6 * rng.normal(size=(3, 3)))
@@ -35,6 +56,15 @@ def test_as_rigid_cleans_a_pose_with_few_digits(rng):
     T = exp_twist(rng.normal(size=6))
     cleaned = as_rigid(np.round(T, 5), "init")
     assert np.allclose(cleaned[:3, :3] @ cleaned[:3, :3].T, np.eye(3), atol=1e-15)
+
+
+def test_nearest_rotation_is_never_a_reflection(rng):
+    """Against SciPy, which solves the same (Kabsch's) problem, for matrices that are far from rotations too."""
+    for _ in range(20):
+        M = rng.normal(size=(3, 3))
+        expected = Rotation.align_vectors(M.T, np.eye(3))[0].as_matrix()
+        assert np.allclose(nearest_rotation(M), expected, atol=1e-9)
+        assert np.linalg.det(nearest_rotation(M)) == pytest.approx(1)
 
 
 @pytest.mark.parametrize(

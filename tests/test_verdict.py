@@ -9,10 +9,22 @@ from scipy.spatial.transform import RigidTransform
 
 import fieldalign as fa
 from fieldalign.alignment import Alignment, Step
+from fieldalign.alignment.robust import Agreement
 from fieldalign.fields import FieldSample, sampled
 from fieldalign.motions import apply, exp_twist, inverse, translation
 from fieldalign.prepared import prepare
-from fieldalign.verdict import STILL, certainty, judge, overlaps, rmse
+from fieldalign.verdict import (
+    MIN_ON,
+    MIN_PURITY,
+    STILL,
+    Certainty,
+    certainty,
+    judge,
+    judge_robust,
+    overlaps,
+    rmse,
+    split,
+)
 
 
 class Spheres:
@@ -94,6 +106,73 @@ def test_a_detail_may_lie_on_a_whole_but_one_of_both_must_agree(overlap, enough)
     last = Step(np.zeros(6), 0.0, 100)
     reason = judge(alignment(steps=(last,)), SimpleNamespace(extent=1.0), overlap)
     assert reason is (fa.Reason.ACCEPTED if enough else fa.Reason.LOW_OVERLAP)
+
+
+# ------------------------------------------------------------------------------------------------ judge, robust method
+
+
+def agreeing(on, purity):
+    """One pose's agreement: a share on the other surface, and how much of what meets it agrees."""
+    return Agreement(agreeing=np.array([0.8 * purity]), on=np.array([on]), met=np.array([0.8]))
+
+
+def known_but(k):
+    return Certainty(np.eye(6), np.eye(6), np.eye(6)[:, :k], np.zeros(3))
+
+
+GOOD = agreeing(0.5, 0.8)
+
+
+@pytest.mark.parametrize(
+    ("there", "back", "enough"),
+    [
+        (GOOD, GOOD, True),
+        (agreeing(MIN_ON - 0.01, 0.8), agreeing(MIN_ON - 0.01, 0.8), False),
+        (agreeing(MIN_ON - 0.01, 0.8), agreeing(MIN_ON + 0.01, 0.8), True),  # a detail on a whole
+        (agreeing(MIN_ON + 0.01, 0.8), agreeing(0.0, 0.8), True),
+        (agreeing(0.5, MIN_PURITY - 0.01), agreeing(0.5, MIN_PURITY - 0.01), False),
+        (agreeing(0.5, MIN_PURITY - 0.01), agreeing(0.5, MIN_PURITY + 0.01), True),
+    ],
+)
+def test_one_of_both_surfaces_must_agree_enough(there, back, enough):
+    reason = judge_robust(there, back, known_but(0), rivals=0, has_converged=True)
+    assert reason is (fa.Reason.ACCEPTED if enough else fa.Reason.LOW_OVERLAP)
+
+
+def test_the_worst_that_is_known_is_the_reason():
+    """In this order: nothing agrees, something slides, others fit as well, the last step was large."""
+    low, still = agreeing(0.0, 0.0), True
+    assert judge_robust(low, low, known_but(2), 3, not still) is fa.Reason.LOW_OVERLAP
+    assert judge_robust(GOOD, GOOD, known_but(2), 3, not still) is fa.Reason.DEGENERATE
+    assert judge_robust(GOOD, GOOD, known_but(0), 3, not still) is fa.Reason.AMBIGUOUS
+    assert judge_robust(GOOD, GOOD, known_but(0), 0, not still) is fa.Reason.NOT_CONVERGED
+    assert judge_robust(GOOD, GOOD, known_but(0), 0, still) is fa.Reason.ACCEPTED
+
+
+@pytest.mark.parametrize("length", [0.01, 1.0, 1000.0])
+def test_a_direction_with_hardly_any_information_is_open(rng, length):
+    """Turns and shifts are compared over a lever; below the least share nothing is known, above all is."""
+    lever = np.array([1, 1, 1, length, length, length])
+    Q = np.linalg.qr(rng.normal(size=(6, 6)))[0]
+    values = np.array([1e-4, 2e-3, 0.1, 0.5, 0.7, 1.0])
+    information = (Q * values) @ Q.T / lever[:, None] / lever
+    found = split(information, np.arange(3.0), length, 1e-3)
+    assert found.unobservable.shape == (6, 1)
+    assert same_span(found.unobservable, (Q[:, :1] * lever[:, None]))
+    expected = (Q[:, 1:] * values[1:]) @ Q[:, 1:].T / lever[:, None] / lever
+    assert np.allclose(found.information * np.outer(lever, lever), expected * np.outer(lever, lever), atol=1e-12)
+    assert np.allclose(found.covariance / np.outer(lever, lever), (Q[:, 1:] / values[1:]) @ Q[:, 1:].T, rtol=1e-9)
+    assert split(information, np.zeros(3), length, 1e-5).unobservable.shape == (6, 0)
+
+
+@pytest.mark.parametrize(
+    ("information", "length"), [(np.zeros((6, 6)), 1.0), (np.full((6, 6), np.nan), 1.0), (np.eye(6), 0.0)]
+)
+def test_without_information_all_is_open(information, length):
+    found = split(information, np.zeros(3), length, 1e-3)
+    assert np.array_equal(found.unobservable, np.eye(6))
+    assert not found.information.any()
+    assert not found.covariance.any()
 
 
 # ------------------------------------------------------------------------------------------------------------- overlap
@@ -308,9 +387,9 @@ def test_the_parts_fit_together_in_any_unit(name, free, pose, pseudo, rng, unit)
     assert is_generalised_inverse(covariance, information)
 
 
-def test_registering_a_plane_says_that_it_slides(rng):
+def test_registering_a_plane_says_that_it_slides(register, rng):
     plane = np.c_[rng.uniform(0, 3, (3000, 2)), np.zeros(3000)]
-    result = fa.register(plane, plane)
+    result = register(plane, plane)
     free = np.zeros((6, 3))
     free[2, 0] = free[3, 1] = free[4, 2] = 1
     # Pseudo points stand straight above points: no gradient of a copy has a part along the plane.
@@ -318,12 +397,12 @@ def test_registering_a_plane_says_that_it_slides(rng):
     assert np.abs(result.information @ free).max() < 1e-6 * np.abs(result.information).max()
 
 
-def test_registering_says_where_its_information_holds(corner, motion, rng):
+def test_registering_says_where_its_information_holds(register, corner, motion, rng):
     T = motion(rng, 20, 0.3)
     far = translation([50, -20, 10])
-    here = fa.register(corner, apply(T, corner))
-    there = fa.register(apply(far, corner), apply(T, corner), init=T @ inverse(far))
-    moved = fa.register(corner, apply(far @ T, corner), init=far @ T)
+    here = register(corner, apply(T, corner))
+    there = register(apply(far, corner), apply(T, corner), init=T @ inverse(far))
+    moved = register(corner, apply(far @ T, corner), init=far @ T)
     for result, shift in ((here, 0), (there, 0), (moved, far[:3, 3])):
         low, high = apply(T, corner).min(axis=0), apply(T, corner).max(axis=0)
         assert (low - 0.2 < result.reference_point - shift).all()

@@ -1,5 +1,7 @@
 """The native core of fieldalign: what loops over points."""
 
+from collections.abc import Mapping
+
 from numpy import float32, float64, int64, uint32
 from numpy.typing import NDArray
 
@@ -19,8 +21,9 @@ class PointTree:
     ) -> tuple[Floats, Floats, Floats, Places]:
         """value (n,), gradient (n, 3), foot (n, 3) and its place (n,) of the field of mean distance to the k nearest
         points; a place of an earlier sample, given as a guess, changes nothing but the time."""
-    def normals(self, queries: Floats, neighbours: int, threads: int) -> Floats:
-        """Unit normals (n, 3) of the planes through the k nearest points."""
+    def surfels(self, queries: Floats, neighbours: int, threads: int) -> tuple[Floats, Floats, Floats]:
+        """Means (n, 3) and unit normals (n, 3) of the planes through the k nearest points, and standard deviations
+        (n, 2) across the plane and along its shorter axis."""
     def rows(self, places: Places) -> Places:
         """Rows (n,) of places (n,) along the tree's curve."""
     def keypoints(
@@ -37,8 +40,13 @@ class PointTree:
 def survey(points: Points, threads: int) -> tuple[Floats, Floats]:
     """Lowest and highest corner (2, 3) and mean (3,) of points (n, 3); not finite where a coordinate is not."""
 
-def thin(points: Points, bounds: Floats, voxel: float, threads: int) -> tuple[Floats, NDArray[uint32]]:
-    """Mean (m, 3) and first row (m,) of the points of each occupied voxel."""
+def occupancy(points: Points, most: int, threads: int) -> tuple[Floats, float, Floats, Floats]:
+    """A box (2, 3) around the points but for far outliers, the edge of a cell around it, and for its k-th halving: how
+    many cells hold two points or more (20,), and which share of the points they hold (20,). By at most `most` points,
+    evenly taken."""
+
+def thin(points: Points, bounds: Floats, voxel: float, threads: int) -> tuple[Floats, Places, Places]:
+    """Mean (m, 3), first row (m,) and number (m,) of the points of each occupied voxel."""
 
 def transform(R: Floats, t: Floats, points: Floats) -> Floats:
     """R (3, 3) times each of points (n, 3), plus t (3,)."""
@@ -65,3 +73,61 @@ def information(J: Floats, w: Floats) -> Floats:
 
 def count_equal(points: Floats) -> NDArray[int64]:
     """For each point (n, 3), how many of them equal it."""
+
+class ClosestGrid:
+    """The surfel closest to any place near a surface: looked up in a grid of cells, up to `margin` off."""
+
+    def __init__(self, means: Floats, normals: Floats, cell: float, margin: float) -> None: ...
+    def robust_sums(
+        self,
+        places: Floats,
+        normals: Floats,
+        offsets: Floats,
+        poses: Floats,
+        scale: float,
+        min_cosine: float,
+        reach: float,
+        threads: int,
+    ) -> tuple[Floats, Floats, Floats]:
+        """H (b, 6, 6) and g (b, 6) of pseudo points (n, 3) under poses (b, 4, 4), and (b, 4): sums of weights, of
+        weighted squares, of the loss's second derivatives, and how many were kept."""
+    def agreement(
+        self,
+        places: Floats,
+        normals: Floats,
+        poses: Floats,
+        scale: float,
+        min_cosine: float,
+        reach: float,
+        threads: int,
+    ) -> Floats:
+        """For each pose the shares of surfels (n, 3) that agree (weighted), are on the surface, are near it (b, 3)."""
+
+class PairTable:
+    """Pairs of surfels at distances from `shortest` to `longest`, found again by what no rigid motion changes."""
+
+    def __init__(self, means: Floats, normals: Floats, shortest: float, longest: float, threads: int) -> None: ...
+    def __len__(self) -> int: ...
+
+def search(
+    grid: ClosestGrid,
+    table: PairTable,
+    drawn_means: Floats,
+    drawn_normals: Floats,
+    probe_means: Floats,
+    probe_normals: Floats,
+    confinement: tuple[Floats, Floats, float, float] | None,
+    settings: Mapping[str, float],
+    threads: int,
+) -> tuple[Floats, Floats, int]:
+    """Poses (c, 4, 4) that take the probes onto the grid's surface, best first, their scores (c,), and how many were
+    tested. confinement: a guess (1, 4, 4), the pivot (3,), the radius, the cosine of the angle."""
+
+def robust_sums(
+    x: Floats, own_normals: Floats, means: Floats, normals: Floats, spreads: Floats, min_cosine: float, reach: float
+) -> tuple[Floats, Floats, Floats]:
+    """As ClosestGrid.robust_sums, of one pose: pseudo points x (n, 3), moved already, their planes (n, 3), and how
+    widely each residual spreads (n,). The scale is three standard deviations of the residuals themselves."""
+
+def take_steps(poses: Floats, H: Floats, g: Floats, stretch: Floats, largest_turn: float) -> tuple[Floats, Floats]:
+    """Twists -stretch H^+ g (b, 6), turning by at most largest_turn, and the poses (b, 4, 4) that they lead to."""

@@ -46,9 +46,19 @@ def rotate(R: Matrix, vectors: Matrix) -> Matrix:
     return _core.transform(np.ascontiguousarray(R), np.zeros(3), np.ascontiguousarray(vectors))
 
 
+def adjoint(T: Matrix) -> Matrix:
+    """Ad (6, 6) of a motion: T Exp(x) T^-1 = Exp(Ad x) for twists x = (w, v)."""
+    R, t = T[:3, :3], T[:3, 3]
+    Ad = np.zeros((6, 6))
+    Ad[:3, :3] = Ad[3:, 3:] = R
+    Ad[3:, :3] = np.cross(t, R.T).T  # [t]_x R
+    return Ad
+
+
 def nearest_rotation(R: Matrix) -> Matrix:
-    """The rotation (3, 3) nearest to R, so that rounding does not build up over many products."""
+    """The rotation (3, 3) nearest to R; for one that is nearly a rotation, it undoes the rounding of many products."""
     U, _, Vt = np.linalg.svd(R)
+    U[:, 2] *= np.linalg.det(U) * np.linalg.det(Vt)  # no reflection
     return np.asarray(U @ Vt)
 
 

@@ -4,24 +4,31 @@ from __future__ import annotations
 
 import os
 from collections.abc import Hashable
-from concurrent.futures import ThreadPoolExecutor
-from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from . import _core
+from .alignment.residual import row_dot
 from .clouds.checks import checked_points
 from .clouds.cloud import PointCloud
 from .errors import ArgumentError
 from .fields import DistanceField, FieldSample, PointField, sampled
-from .fields.protocol import Floats
+from .fields.protocol import Floats, Planes, planes_near
+from .lazy import lazy
 from .pseudo import draw_places, draw_pseudo_points
+from .scale import Scale, scale_of, within
 from .settings import Settings
+from .surface import Surface
 from .threads import resolve_threads
 
 _KEPT = 8  # pseudo sets that a prepared cloud remembers
+_FINE = 50_000  # points: more are thinned before the last level of an alignment
+_PSEUDO = 5_000  # pseudo points of the last level: with 10 to 20 neighbours each they see nearly every fine point
+_FINER = 4.0    # to voxels so much smaller than the search's
+_SURFACE_SAMPLES = 20_000  # places that stand for a field that is no cloud
 _PROBES = 200  # surface points that stand for the whole where an overlap is measured
 
 
@@ -32,25 +39,28 @@ class PreparedCloud:
     dropped: how many NaN rows were left out.
     """
 
-    def __init__(self, field: DistanceField, dropped: int = 0) -> None:
+    def __init__(self, field: DistanceField, dropped: int = 0, threads: int | None = None) -> None:
         self.field = field
         self.dropped = dropped
+        self._threads = resolve_threads(threads)
         self._features: dict[Hashable, tuple[Floats, FieldSample]] = {}
+        self._surfaces: dict[int, Surface] = {}
+        self._pseudo: dict[int, Planes] = {}
 
-    @cached_property
+    @lazy
     def centre(self) -> Floats:
         """Where the cloud lies, (3,): its mean, or the middle of a field's bounds."""
         if isinstance(self.field, PointField):
             return self.field.centre
         return np.asarray(np.mean(_bounds(self.field), axis=0))
 
-    @cached_property
+    @lazy
     def extent(self) -> float:
         """The diagonal of the bounding box."""
         low, high = _bounds(self.field)
         return float(np.linalg.norm(high - low))
 
-    @cached_property
+    @lazy
     def probes(self) -> tuple[Floats, float]:
         """Places on the surface (200, 3), and within which distance another cloud's surface counts as the same."""
         rng = np.random.default_rng(0)  # a sample of the cloud itself, alike for every registration
@@ -58,6 +68,59 @@ class PreparedCloud:
         if isinstance(self.field, PointField):
             return places, 3 * float(np.median(self.field.spacing(places)))
         return places, 0.0
+
+    def build(self) -> None:
+        """Builds the search tree of all its points, if it has any: the paper's method asks nothing else."""
+        if isinstance(self.field, PointField):
+            _ = self.field.tree
+
+    @lazy
+    def fine(self) -> PointField:
+        """The surface as points, no denser than the last level of an alignment can use: the cloud's own or thinned."""
+        if not isinstance(self.field, PointField):
+            places = draw_places(self.field, _SURFACE_SAMPLES, np.random.default_rng(0))
+            return PointField(places, threads=self._threads)
+        points, scale = self.field.points, scale_of(self.field.points, self._threads)
+        inside = within(scale.core, points, self.field.bounds)
+        if len(inside) > _FINE:
+            bounds, _ = _core.survey(inside, self._threads)
+            inside = _core.thin(inside, bounds, max(scale.voxel / _FINER, scale.finest), self._threads)[0]
+        return self.field if inside is points else PointField(inside, threads=self._threads)
+
+    @lazy
+    def scale(self) -> Scale:
+        """The lengths that the cloud itself suggests."""
+        return scale_of(self.fine.points, self._threads)
+
+    def surface(self, voxel: float) -> Surface:
+        """The surfels at about this voxel, kept for the next pair: at the nearest rung of a ladder of quarter octaves
+        from the cloud's own voxel."""
+        rung = round(4 * float(np.log2(voxel / self.scale.voxel)))
+        if rung not in self._surfaces:
+            self._surfaces[rung] = Surface(self.fine.points, self.scale.voxel * 2.0 ** (rung / 4), self._threads)
+        return self._surfaces[rung]
+
+    @property
+    def exact(self) -> DistanceField:
+        """What the last level of an alignment asks: the fine points, or the field itself where it is no cloud."""
+        return self.fine if isinstance(self.field, PointField) else self.field
+
+    def pseudo_planes(self, neighbours: int) -> Planes:
+        """Pseudo points of the last level: places spread over the surface, and the planes there."""
+        if neighbours not in self._pseudo:
+            self._pseudo[neighbours] = planes_near(self.exact, self.fine.spread(_PSEUDO), neighbours)
+        return self._pseudo[neighbours]
+
+    def is_copy_of(self, other: PreparedCloud) -> bool:
+        """Whether both are the same points but for a motion and the order, as far as two moments tell: of the fine
+        points, which are few but thinned differently, then of all."""
+        clouds = self.field, other.field
+        if not (isinstance(clouds[0], PointField) and isinstance(clouds[1], PointField)):
+            return False
+        if len(clouds[0]) != len(clouds[1]):
+            return False
+        fine = _moments(self.fine), _moments(other.fine)
+        return np.allclose(*fine, rtol=0.03) and np.allclose(_moments(clouds[0]), _moments(clouds[1]), rtol=1e-5)
 
     def sampled_by(self, settings: Settings, threads: int | None) -> DistanceField:
         """The field as the settings want it sampled."""
@@ -98,23 +161,11 @@ def prepare(cloud: CloudLike, *, threads: int | None = None, drop_nonfinite: boo
 def prepare_pair(
     source: CloudLike, target: CloudLike, threads: int, drop_nonfinite: bool
 ) -> tuple[PreparedCloud, PreparedCloud]:
-    """prepare() of both clouds of a pair, side by side: two trees of half the threads each are built sooner than one
-    after the other by all threads, which then wait for each other."""
-    if threads == 1 or _is_ready(source) or _is_ready(target):
-        return (
-            prepare_named(source, "source", threads, drop_nonfinite),
-            prepare_named(target, "target", threads, drop_nonfinite),
-        )
-    jobs = [(cloud, name, threads // 2, drop_nonfinite) for cloud, name in ((source, "source"), (target, "target"))]
-    with ThreadPoolExecutor(2) as pool:
-        moving, fixed = (pool.submit(prepare_named, *job) for job in jobs)
-        return moving.result(), fixed.result()
-
-
-def _is_ready(cloud: CloudLike) -> bool:
-    """Whether preparing it takes no time worth a thread."""
-    few = isinstance(cloud, np.ndarray) and len(cloud) < 20_000
-    return few or isinstance(cloud, PreparedCloud | DistanceField)
+    """prepare() of both clouds of a pair."""
+    return (
+        prepare_named(source, "source", threads, drop_nonfinite),
+        prepare_named(target, "target", threads, drop_nonfinite),
+    )
 
 
 def prepare_named(cloud: CloudLike, name: str, threads: int | None, drop_nonfinite: bool) -> PreparedCloud:
@@ -122,9 +173,9 @@ def prepare_named(cloud: CloudLike, name: str, threads: int | None, drop_nonfini
     if isinstance(cloud, PreparedCloud):
         return cloud
     if isinstance(cloud, DistanceField):
-        return PreparedCloud(cloud)
+        return PreparedCloud(cloud, threads=threads)
     checked = checked_points(_points_of(cloud), name, resolve_threads(threads), drop_nonfinite)
-    return PreparedCloud(PointField(checked, threads=threads), checked.dropped)
+    return PreparedCloud(PointField(checked, threads=threads), checked.dropped, threads)
 
 
 def _points_of(cloud: Any) -> Any:
@@ -133,6 +184,13 @@ def _points_of(cloud: Any) -> Any:
 
         cloud = read_cloud(cloud)
     return cloud.points if isinstance(cloud, PointCloud) else cloud
+
+
+def _moments(cloud: PointField) -> Floats:
+    """Mean squared and mean fourth power of the distances to the mean, (2,): no motion and no order changes them."""
+    away = np.asarray(cloud.points, float) - cloud.centre
+    squared = row_dot(away, away)
+    return np.array([squared.mean(), (squared**2).mean()])
 
 
 def _bounds(field: DistanceField) -> Floats:

@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from time import perf_counter
 from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
-from .alignment import align
-from .alignment.residual import residual
-from .arguments import as_count
+from .arguments import as_count, check_one_of, check_positive
+from .clock import Clock
 from .errors import ArgumentError
-from .fields import sampled
-from .motions import apply, as_rigid, inverse, translation
+from .methods import register_by_paper, register_robust
+from .methods.robust import Start
+from .motions import as_rigid
 from .prepared import CloudLike, prepare_pair
-from .result import Reason, RegistrationResult
+from .result import RegistrationResult
 from .settings import Settings, as_settings
 from .threads import resolve_threads
-from .verdict import certainty, judge, overlaps, rmse
 
 
 def register(
@@ -28,7 +27,7 @@ def register(
     search: bool | None = None,
     search_radius: float | None = None,
     search_angle: float | None = None,
-    method: str = "paper",
+    method: str = "robust",
     settings: Settings | str | None = None,
     seed: int = 0,
     threads: int | None = None,
@@ -36,74 +35,66 @@ def register(
     scale: bool = False,
     drop_nonfinite: bool = True,
 ) -> RegistrationResult:
-    """The rigid motion that brings `source` onto `target`, by the paper's method (Yuan & Nüchter, RA-L 2022).
+    """The rigid motion that brings `source` onto `target`: from any pose, without a guess or a length.
 
     source, target: points (N, 3), PointClouds, paths, DistanceFields or prepared clouds (fa.prepare), in one unit.
-    init: (4, 4), first guess of T_target_source; None: the clouds' centroids are laid on each other.
-    method: "paper". It starts at one guess: motions of up to about 45 degrees from it are found.
-    settings: "object", "indoor" (its default), "outdoor", or a Settings object; its lengths are in the clouds' unit,
-        in the presets they are metres (`fa.PRESETS["indoor"].scaled(1000)` for millimetres).
-    seed: of the pseudo points; the same seed gives the same bits at any number of threads.
+    init: (4, 4), a guess of T_target_source. The search is then skipped, or confined by the two arguments below.
+    search: True: search, though there is an init; False: never; None: where there is no init, or where it is confined.
+    search_radius, search_angle: confine the search to so far from init: the shift of the overlap's middle (the clouds'
+        unit), and the turn (degrees, up to 180); None: as far as need be.
+    method: "robust": any-pose search, then the pseudo points aligned from coarse to fine (docs/method.md); "paper": the
+        method of Yuan & Nüchter (RA-L 2022) as published, from one guess (init, or the centroids laid on each other):
+        motions of up to about 45 degrees from it are found; it never searches.
+    settings: of "paper": "object", "indoor" (its default), "outdoor", or a Settings object; lengths in the clouds'
+        unit, in the presets metres (`fa.PRESETS["indoor"].scaled(1000)` for millimetres). "robust" takes none.
+    seed: of every random draw; the same seed gives the same bits at any number of threads.
     threads: None means all cores.
     drop_nonfinite: NaN rows are missing returns, dropped and counted; infinity always raises.
-    search, search_radius, search_angle, dof, scale: not available in this version; anything but the default raises.
+    dof, scale: not available in this version; anything but the default raises.
 
     Raises ArgumentError for a cloud of the wrong shape, with fewer than 3 distinct points or with infinity, for an init
-    that is not rigid, and for settings out of range; CloudFileError for a file that cannot be read.
+    that is not rigid, and for arguments out of range or that do not go together; CloudFileError for a file that cannot
+    be read.
     """
-    _refuse_what_is_missing(method, search, search_radius, search_angle, dof, scale)
-    chosen, seed, threads = as_settings(settings), as_count(seed, "seed", 0), resolve_threads(threads)
-    clock = _Clock()
-    moving, fixed = prepare_pair(source, target, threads, drop_nonfinite)
-    clock.lap("prepare")
-    pseudo, target_features = fixed.features(chosen, seed, threads)
-    clock.lap("pseudo points")
-    T_start = translation(fixed.centre - moving.centre) if init is None else as_rigid(init, "init")
-    field = moving.sampled_by(chosen, threads)
-    found = align(field, target_features, pseudo, T_start, (moving.centre, fixed.centre), chosen)
-    clock.lap("align")
-    at_source = sampled(field, apply(inverse(found.T_target_source), pseudo), found.at_source)
-    known = certainty(at_source, pseudo, found, residual(at_source, target_features))
-    overlap, overlap_target = overlaps(moving, fixed, found.T_target_source)
-    reason = judge(found, moving, (overlap, overlap_target))
-    clock.lap("judge")
-    return RegistrationResult(
-        T_target_source=found.T_target_source,
-        accepted=reason is Reason.ACCEPTED,
-        reason=reason,
-        overlap=overlap,
-        overlap_target=overlap_target,
-        information=known.information,
-        covariance=known.covariance,
-        unobservable=known.unobservable,
-        reference_point=known.reference_point,
-        iterations=len(found.steps),
-        rmse=rmse(at_source, target_features, found),
-        seconds=clock.laps,
-        history=found.steps,
-        dropped=(moving.dropped, fixed.dropped),
-    )
-
-
-class _Clock:
-    """Seconds by stage."""
-
-    def __init__(self) -> None:
-        self.laps: dict[str, float] = {}
-        self._last = perf_counter()
-
-    def lap(self, stage: str) -> None:
-        now = perf_counter()
-        self.laps[stage], self._last = now - self._last, now
-
-
-def _refuse_what_is_missing(
-    method: str, search: bool | None, radius: float | None, angle: float | None, dof: Any, scale: bool
-) -> None:
-    """The interface is fixed from the start; what this version does not do yet is refused, not ignored."""
-    if method != "paper":
-        raise ArgumentError(f"method must be 'paper' in this version, but is {method!r}")
-    if search or radius is not None or angle is not None:
-        raise ArgumentError("search is not available in this version: give a guess with init, or leave it out")
+    check_one_of("method", method, ("robust", "paper"))
     if dof is not None or scale:
         raise ArgumentError("dof and scale are not available in this version: a rigid motion of six freedoms is found")
+    seed, threads, clock = as_count(seed, "seed", 0), resolve_threads(threads), Clock()
+    start = _start(method, init, search, search_radius, search_angle)
+    if method == "paper":
+        if search or search_radius is not None or search_angle is not None:
+            raise ArgumentError("method 'paper' never searches: leave search, search_radius and search_angle out")
+        chosen = as_settings(settings)
+        pair = prepare_pair(source, target, threads, drop_nonfinite)
+        return register_by_paper(*pair, start.init, chosen, seed, threads, clock)
+    if settings is not None:
+        raise ArgumentError(f"settings belong to method 'paper'; method 'robust' takes none, but got {settings!r}")
+    return register_robust(*prepare_pair(source, target, threads, drop_nonfinite), start, seed, threads, clock)
+
+
+def _start(
+    method: str, init: ArrayLike | None, search: bool | None, radius: float | None, angle: float | None
+) -> Start:
+    """Where to begin and whether to search, from arguments that are checked here."""
+    if search not in (None, True, False):
+        raise ArgumentError(f"search must be True, False or None, but is {search!r}")
+    guess = None if init is None else as_rigid(init, "init")
+    is_confined = radius is not None or angle is not None
+    if is_confined and guess is None:
+        raise ArgumentError("search_radius and search_angle confine the search around init, but there is no init")
+    if is_confined and search is False:
+        raise ArgumentError("search_radius and search_angle confine a search, but search is False")
+    if guess is None and search is False and method == "robust":
+        raise ArgumentError("search=False needs a guess to start from, but there is no init")
+    if radius is not None:
+        check_positive("search_radius", radius)
+    if angle is not None:
+        check_positive("search_angle", angle)
+        if angle > 180:
+            raise ArgumentError(f"search_angle must be at most 180 degrees, but is {angle!r}")
+    return Start(
+        guess,
+        searches=guess is None or is_confined or bool(search),
+        radius=np.inf if radius is None else float(radius),
+        angle=np.pi if angle is None else float(np.radians(angle)),
+    )

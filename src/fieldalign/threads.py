@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 from .arguments import as_count
 
@@ -13,3 +16,11 @@ def resolve_threads(threads: int | None) -> int:
         affinity = getattr(os, "sched_getaffinity", None)  # not on macOS and Windows
         return len(affinity(0)) if affinity else os.cpu_count() or 1
     return as_count(threads, "threads", 1)
+
+
+def side_by_side(threads: int, *tasks: Callable[[], Any]) -> list[Any]:
+    """The answers of tasks that do not depend on each other, run at once where there is more than one thread."""
+    if threads == 1:
+        return [task() for task in tasks]
+    with ThreadPoolExecutor(min(threads, len(tasks))) as pool:
+        return [job.result() for job in [pool.submit(task) for task in tasks]]

@@ -12,7 +12,7 @@ from fieldalign.motions import inverse, translation
 THREE_SIGMA = 20.1  # 0.9973 quantile of chi^2 with six degrees of freedom
 
 
-@pytest.fixture(scope="session", params=[0, 3, 6])
+@pytest.fixture(scope="session", params=[3, 6, 11])
 def scans(request):
     """Two simulated scans of a room, 20,000 points each, with noise: source, target."""
     pair = simulate_pair(request.param, 20_000)
@@ -30,3 +30,16 @@ def within_three_sigma():
         return float(x @ np.linalg.pinv(2 * a.covariance) @ x) < THREE_SIGMA
 
     return check
+
+
+@pytest.fixture(scope="session")
+def box():
+    """The six sides of a box of 1 x 2 x 3, 6000 points: it fits onto itself in four ways."""
+    rng = np.random.default_rng(5)
+    edges = np.array([1.0, 2, 3])
+    sides = []
+    for axis, side in np.ndindex(3, 2):
+        face = rng.random((int(3000 * edges.prod() / edges[axis] / 11), 3))
+        face[:, axis] = side
+        sides.append(edges * face)
+    return np.vstack(sides)[rng.permutation(sum(map(len, sides)))]

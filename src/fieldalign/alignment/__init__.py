@@ -1,5 +1,6 @@
-"""Alignment: the paper's method on two distance fields."""
+"""Alignment: the paper's method, and the robust one, on two distance fields."""
 
-from .solver import Alignment, Step, align
+from .paper import Alignment, align
+from .solver import Step, descend
 
-__all__ = ["Alignment", "Step", "align"]
+__all__ = ["Alignment", "Step", "align", "descend"]

@@ -21,33 +21,40 @@ from .progress import stages
 @click.command("register")
 @click.argument("source", type=click.Path())
 @click.argument("target", type=click.Path())
-@click.option("--init", metavar="POSE", help="First guess of T_target_source: .txt, .npy, .json, or 16 numbers.")
+@click.option("--init", metavar="POSE", help="Guess of T_target_source: .txt, .npy, .json, or 16 numbers.")
+@click.option("--search-radius", type=float, help="With --init: search so far from it (the clouds' unit).")
+@click.option("--search-angle", type=float, help="With --init: search so far from it (degrees).")
 @click.option("--output", type=click.Path(), help="Write the source, moved into the target's frame, to this file.")
 @click.option("--json", "json_path", type=click.Path(allow_dash=True), help="Write the result as JSON; - for stdout.")
 @click.option("--picture", type=click.Path(), help="Draw both clouds before and after (.png, .svg, .pdf).")
-@click.option("--settings", type=click.Choice(list(fa.PRESETS)), default="indoor", show_default=True)
-@click.option("--length-scale", type=click.FloatRange(min=0, min_open=True), default=1.0, show_default=True,
-              help="Multiply every length of the settings: 1000 for millimetres, 0.1 for a tenth of the size.")
-@click.option("--seed", type=int, default=0, show_default=True, help="Seed of the pseudo points.")
+@click.option("--method", type=click.Choice(["robust", "paper"]), default="robust", show_default=True,
+              help="robust: from any pose; paper: as published, from --init or the centroids.")
+@click.option("--settings", type=click.Choice(list(fa.PRESETS)), help="Of the paper's method.  [default: indoor]")
+@click.option("--length-scale", type=click.FloatRange(min=0, min_open=True),
+              help="Of the paper's method: multiply its lengths, which are metres: 1000 for millimetres.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Seed of every random draw.")
 @click.option("--threads", type=int, default=None, help="How many threads; all cores by default.")
 def command(
     source: str,
     target: str,
     init: str | None,
+    search_radius: float | None,
+    search_angle: float | None,
     output: str | None,
     json_path: str | None,
     picture: str | None,
-    settings: str,
-    length_scale: float,
+    method: str,
+    settings: str | None,
+    length_scale: float | None,
     seed: int,
     threads: int | None,
 ) -> int:
-    """Find the motion that brings SOURCE onto TARGET.
+    """Find the motion that brings SOURCE onto TARGET, from any pose.
 
     SOURCE and TARGET are scans in one unit: .ply, .pcd, .xyz, .txt, .csv, .npy, .npz, .bin, .las, .laz, .e57, .obj,
-    .stl. The presets' lengths are metres.
+    .stl.
     """
-    chosen = fa.PRESETS[settings].scaled(length_scale)
+    chosen = _settings(method, settings, length_scale)
     guess = None if init is None else read_pose(init)
     _check_outputs(output, picture)
     with stages("reading source", "reading target", "aligning", "writing") as stage:
@@ -56,7 +63,10 @@ def command(
         stage()
         target_cloud = fa.read_cloud(target)
         stage()
-        result = fa.register(source_cloud, target_cloud, init=guess, settings=chosen, seed=seed, threads=threads)
+        result = fa.register(
+            source_cloud, target_cloud, init=guess, search_radius=search_radius, search_angle=search_angle,
+            method=method, settings=chosen, seed=seed, threads=threads,
+        )
         stage()
         if output is not None:
             fa.write_cloud(output, source_cloud.transformed(result.T_target_source))
@@ -72,6 +82,15 @@ def command(
     else:
         _print(result)
     return 0 if result.accepted else 3
+
+
+def _settings(method: str, preset: str | None, length_scale: float | None) -> fa.Settings | None:
+    """The paper's settings; None for the robust method, which takes none."""
+    if method == "robust":
+        if preset is not None or length_scale is not None:
+            raise ArgumentError("--settings and --length-scale belong to --method paper; the robust method takes none")
+        return None
+    return fa.PRESETS[preset or "indoor"].scaled(length_scale or 1.0)
 
 
 def _check_outputs(output: str | None, picture: str | None) -> None:

@@ -34,7 +34,7 @@ def thin(cloud: PointCloud | ArrayLike, voxel: float, *, threads: int | None = N
         given = given[~np.isnan(given.points).any(axis=1)]
     bounds, _ = _core.survey(points, cores)
     try:
-        means, first = _core.thin(points, bounds, float(voxel), cores)
+        means, first, _ = _core.thin(points, bounds, float(voxel), cores)
     except ValueError as error:
         raise ArgumentError(f"voxel is too small: {error}") from error
     return replace(given[first], points=means)

@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 from .. import _core
 from ..arguments import MAX_NEIGHBOURS, as_count
 from ..clouds.checks import Checked, checked_points
+from ..lazy import lazy
 from ..threads import resolve_threads
-from .protocol import FieldSample, Floats
+from .protocol import FieldSample, Floats, Planes
 
 
 class PointField:
@@ -35,13 +36,18 @@ class PointField:
         self._choose(neighbours, normal_neighbours, threads)
         checked = points if isinstance(points, Checked) else checked_points(points, "points", self.threads)
         self.points, self.bounds, self.centre = checked.points, checked.bounds, checked.mean
-        self._tree = _core.PointTree(self.points, self.threads)
+
+    @lazy
+    def tree(self) -> _core.PointTree:
+        """The search tree, built when first asked for: who only thins the points needs none."""
+        return _core.PointTree(self.points, self.threads)
 
     def __len__(self) -> int:
         return len(self.points)
 
     def using(self, neighbours: int, normal_neighbours: int, threads: int | None) -> PointField:
         """The same points under other settings; the tree is shared."""
+        _ = self.tree  # built before it is copied, so that both share it
         other = copy.copy(self)
         other._choose(neighbours, normal_neighbours, threads)
         return other
@@ -56,7 +62,7 @@ class PointField:
 
         guess: (L,), `place` of an earlier sample of points nearby; it halves the time and changes nothing else.
         """
-        value, gradient, foot, place = self._tree.sample(
+        value, gradient, foot, place = self.tree.sample(
             np.ascontiguousarray(x, float), self.neighbours, guess, self.threads
         )
         return FieldSample(value, gradient, foot, lambda: self.normals(foot), place)
@@ -64,17 +70,45 @@ class PointField:
     def nearest(self, x: ArrayLike, neighbours: int = 1) -> tuple[Floats, NDArray[np.int64]]:
         """Distances (L, k) and rows (L, k) of the k nearest points to the places x (L, 3), nearest first."""
         places = np.ascontiguousarray(x, float)
-        return self._tree.nearest(places, as_count(neighbours, "neighbours", 1, MAX_NEIGHBOURS), self.threads)
+        return self.tree.nearest(places, as_count(neighbours, "neighbours", 1, MAX_NEIGHBOURS), self.threads)
 
     def normals(self, x: ArrayLike) -> Floats:
         """Unit normals (L, 3) of the planes through the nearest points to the places x (L, 3); sign free."""
-        return self._tree.normals(np.ascontiguousarray(x, float), self.normal_neighbours, self.threads)
+        return self.surfels(x, self.normal_neighbours)[1]
+
+    def surfels(self, x: ArrayLike, neighbours: int) -> tuple[Floats, Floats, Floats]:
+        """The planes through the nearest points to the places x (L, 3): means and unit normals (L, 3), sign free, and
+        standard deviations (L, 2) across the plane and along its shorter axis."""
+        return self.tree.surfels(np.ascontiguousarray(x, float), neighbours, self.threads)
+
+    def planes(self, x: Floats, neighbours: int, last: Planes | None = None) -> Planes:
+        """The planes through the points next to the feet of the places x (L, 3)."""
+        *_, foot, place = self.tree.sample(x, 1, None if last is None else last.place, self.threads)
+        if last is None or last.place is None:
+            return Planes(*self._planes_through(foot, neighbours), place)
+        changed = place != last.place
+        parts = last.mean.copy(), last.normal.copy(), last.thickness.copy(), last.width.copy()
+        for part, new in zip(parts, self._planes_through(foot[changed], neighbours), strict=True):
+            part[changed] = new
+        return Planes(*parts, place)
+
+    def _planes_through(self, foot: Floats, neighbours: int) -> tuple[Floats, Floats, Floats, Floats]:
+        """Mean, normal, thickness and width of the planes at places on the surface."""
+        mean, normal, spread = self.surfels(foot, neighbours)
+        thickness, width = np.ascontiguousarray(spread.T)
+        return mean, normal, thickness, width
+
+    def spread(self, count: int) -> Floats:
+        """Some `count` points of the cloud (m, 3), evenly along the tree's curve, and so over the surface."""
+        stride = max(1, len(self) // count)
+        rows = self.tree.rows(np.arange(stride // 2, len(self), stride, dtype=np.uint32))
+        return np.ascontiguousarray(self.points[rows], float)
 
     def drawn(self, count: int, rng: np.random.Generator) -> Floats:
         """Points (count, 3) drawn with replacement, in the order of the tree's curve: neighbours follow each other, and
         each finds the tree's nodes still in the cache."""
         places = np.sort(rng.integers(0, len(self), count, dtype=np.uint32))
-        return np.asarray(self.points[self._tree.rows(places)], float)
+        return np.asarray(self.points[self.tree.rows(places)], float)
 
     def spacing(self, x: ArrayLike) -> Floats:
         """For points x (L, 3) of the cloud, the distance (L,) to the next point that is not the same place."""
@@ -93,4 +127,4 @@ class PointField:
         """
         stride = max(1, len(self) // 4096)
         resolution = float(self.spacing(self.points[::stride]).mean())
-        return self._tree.keypoints(6 * resolution, 4 * resolution, gamma, gamma, min_neighbours, self.threads)
+        return self.tree.keypoints(6 * resolution, 4 * resolution, gamma, gamma, min_neighbours, self.threads)

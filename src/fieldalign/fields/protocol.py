@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Protocol, runtime_checkable
 
@@ -84,6 +85,15 @@ class DistanceField(Protocol):
         ...
 
 
+@runtime_checkable
+class HasPlanes(Protocol):
+    """A field that smooths its surface by planes of its own."""
+
+    def planes(self, x: Floats, neighbours: int, last: Planes | None = None) -> Planes:
+        """As planes_near()."""
+        ...
+
+
 def sampled(field: DistanceField, x: Floats, last: FieldSample | None = None) -> FieldSample:
     """A field at the places x (L, 3), as a FieldSample; raises FieldError where a foreign field answers nonsense.
 
@@ -101,6 +111,43 @@ def sampled(field: DistanceField, x: Floats, last: FieldSample | None = None) ->
     if not np.isfinite(sample.value.sum() + sample.gradient.sum()):
         raise FieldError(f"{type(field).__name__}.sample must give finite values and gradients, but gave NaN or inf")
     return sample
+
+
+@dataclass(frozen=True, eq=False)
+class Planes:
+    """The surface near L places as planes.
+
+    mean, normal: (L, 3), a place on each and its unit normal, sign free. thickness: (L,), how far the surface scatters
+    across, as a standard deviation. width: (L,), how far the points in the plane reach along it; infinite: no points.
+    place: (L,), where the field keeps what it found; None: it keeps no such thing.
+    """
+
+    mean: Floats
+    normal: Floats
+    thickness: Floats
+    width: Floats
+    place: NDArray[np.uint32] | None = None
+
+    def about(self, origin: Floats) -> Planes:
+        """The same planes, with places counted from an origin (3,)."""
+        return Planes(self.mean - origin, self.normal, self.thickness, self.width)
+
+    def __getitem__(self, rows: slice) -> Planes:
+        """Some of them."""
+        parts = self.mean, self.normal, self.thickness, self.width
+        mean, normal, thickness, width = (np.ascontiguousarray(part[rows]) for part in parts)
+        return Planes(mean, normal, thickness, width)
+
+
+def planes_near(field: DistanceField, x: Floats, neighbours: int, last: Planes | None = None) -> Planes:
+    """The planes at the feet of the places x (L, 3); for points, those through `neighbours` of them.
+
+    last: the answer for the same places a little earlier; where a foot is the same, so is its plane.
+    """
+    if isinstance(field, HasPlanes):
+        return field.planes(x, neighbours, last)
+    sample = sampled(field, x)
+    return Planes(sample.foot, np.ascontiguousarray(sample.normal), np.zeros(len(x)), np.full(len(x), np.inf))
 
 
 def _from_tuple(field: DistanceField, answer: Any) -> FieldSample:

@@ -1,0 +1,86 @@
+// The robust step: pseudo points near one cloud's surface against the planes of the other's.
+//
+// A pseudo point lies `offset` from its own surface, along the normal n' there. Where it is moved to x, the other surface
+// is the plane (m, n) at x's foot, and the two signed distances should agree: r = N.(x - m) - offset N.n'. N halves n and
+// n', so that a curved surface pulls to neither side (symmetric objective, Rusinkiewicz, SIGGRAPH 2019). The row of the
+// Jacobian for a twist (w, v) on the pose's left is [x cross N, N].
+#pragma once
+
+#include <limits>
+#include <optional>
+
+#include "least_squares.hpp"
+#include "vec.hpp"
+
+namespace fieldalign {
+
+struct RobustLoss {
+  double scale;       // of residuals over their spread: one as large has a quarter of the weight
+  double min_cosine;  // between normals that agree: below, a pseudo point is truncated
+  double reach;       // from x to m, a length: beyond, a pseudo point has no partner
+};
+
+struct Residual {
+  double r, cosine;
+  Vec3 between;
+};
+
+// Nothing where the pseudo point is truncated.
+inline std::optional<Residual> residual(Vec3 x, Vec3 own_normal, double offset, Vec3 mean, Vec3 normal,
+                                        const RobustLoss& loss) {
+  const Vec3 away = x - mean;
+  if (!(dot(away, away) <= loss.reach * loss.reach)) return {};
+  double cosine = dot(normal, own_normal);
+  if (cosine < 0) normal = -1.0 * normal, cosine = -cosine;
+  if (!(cosine >= loss.min_cosine)) return {};
+  Vec3 between = normal + own_normal;
+  between = (1 / std::sqrt(dot(between, between))) * between;
+  return Residual{dot(between, away) - offset * dot(between, own_normal), cosine, between};
+}
+
+// Geman and McClure's weight (1 + z^2)^-2 of z = r / (scale spread), times the cosine between the normals.
+inline double weight_of(const Residual& found, double spread, const RobustLoss& loss) {
+  const double z = found.r / (loss.scale * spread), falloff = 1 / (1 + z * z);
+  return found.cosine * falloff * falloff;
+}
+
+// What one pose's pseudo points add up to for its next step.
+struct StepSums {
+  NormalEquations equations;  // of H, the upper triangle
+  double weights = 0;         // sum of weights
+  double squares = 0;         // sum of weight r^2
+  double curvature = 0;       // sum of the loss's second derivatives
+  int kept = 0;               // not truncated
+
+  void add(Vec3 x, const Residual& found, double spread, const RobustLoss& loss) {
+    const double w = weight_of(found, spread, loss) / (spread * spread);
+    const double z = found.r / (loss.scale * spread);
+    const Vec3 n = found.between, moment = cross(x, n);
+    const double row[6] = {moment.x, moment.y, moment.z, n.x, n.y, n.z};
+    for (int a = 0; a < 6; ++a) {
+      const double weighted = w * row[a];
+      equations.g[a] += weighted * found.r;
+      for (int b = a; b < 6; ++b) equations.H[a][b] += weighted * row[b];
+    }
+    weights += w;
+    squares += w * found.r * found.r;
+    curvature += w * (1 - 4 * z * z / (1 + z * z));
+    ++kept;
+  }
+};
+
+// How well one pose lays surfels on the other surface.
+struct AgreementSums {
+  double agreeing = 0;  // sum of weights: 1 for each surfel where the surfaces coincide
+  int on = 0;           // on the other surface: within the scale across, and twice that in all
+  int met = 0;          // near the other surface at all
+
+  void add(Vec3 x, Vec3 own_normal, Vec3 mean, Vec3 normal, const RobustLoss& loss) {
+    ++met;
+    const Vec3 away = x - mean;
+    on += dot(away, away) < 4 * loss.scale * loss.scale && std::abs(dot(away, normal)) < loss.scale;
+    if (const auto found = residual(x, own_normal, 0, mean, normal, loss)) agreeing += weight_of(*found, 1, loss);
+  }
+};
+
+}  // namespace fieldalign

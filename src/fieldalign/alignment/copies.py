@@ -1,0 +1,41 @@
+"""Two copies of one cloud: the points themselves can meet, to the last digits."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..fields import PointField
+from ..fields.protocol import Floats
+from ..motions import apply, nearest_rotation
+
+_ROUNDS = 20
+_MET = 1e-3  # of the distance between neighbouring points: so close, the nearest point is the point itself
+
+
+def meet(held: PointField, places: Floats, pose: Floats) -> Floats | None:
+    """The motion (4, 4) that lays places (M, 3) of a copy on the held points, from a pose that nearly does.
+
+    Closest points, and the motion between them in closed form (Kabsch, Acta Cryst. A 1976), until nothing changes. None
+    where the places do not meet points: the clouds are no copies.
+    """
+    spacing = float(np.median(held.spacing(held.spread(1000))))
+    last, place = np.inf, None
+    for _ in range(_ROUNDS):
+        moved = apply(pose, places)
+        sample = held.sample(moved, place)
+        place, typical = sample.place, float(np.median(sample.value))
+        if not typical < last:
+            break
+        near = sample.value <= 3 * typical
+        pose, last = _motion_between(places[near], sample.foot[near]), typical
+    return pose if last < _MET * spacing else None
+
+
+def _motion_between(places: Floats, onto: Floats) -> Floats:
+    """The motion that lays places (M, 3) on others with the least sum of squares."""
+    middle, onto_middle = places.mean(axis=0), onto.mean(axis=0)
+    R = nearest_rotation(np.einsum("ni,nj->ij", onto - onto_middle, places - middle))
+    T = np.eye(4)
+    T[:3, :3] = R
+    T[:3, 3] = onto_middle - R @ middle
+    return T

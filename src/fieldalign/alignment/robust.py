@@ -1,0 +1,225 @@
+"""The robust alignment: pseudo points annealed along the normals, from coarse to fine, many poses at once.
+
+The residual is the paper's (eq. 11) on signed distances to planes instead of squared distances; weights and truncation
+stand in cpp/linearise.hpp.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import _core
+from ..fields.protocol import DistanceField, Floats, Planes, planes_near
+from ..motions import apply, rotate
+from ..surface import Surface
+from .residual import row_dot
+from .solver import Step, descend
+
+MIN_COSINE = 0.8      # between normals that agree
+LARGEST_TURN = 0.3    # rad, of a step
+
+
+@dataclass(frozen=True)
+class Level:
+    """How far pseudo points lie from the surface (standard deviation, voxels), how many they are, how many steps they
+    take, and how many poses go on from here, best first."""
+
+    spread: float
+    count: int
+    iterations: int
+    keep: int
+
+
+LEVELS = (Level(2.0, 240, 5, 24), Level(1.0, 300, 4, 12), Level(0.4, 700, 4, 8))
+_LEAST_SPREAD = 0.1   # of the typical variance: no plane is taken for more exact
+_SHARPEST = 0.3       # voxels: no coarse level weighs residuals by less
+_SCORED = 600         # surfels that a pruning goes by
+_SAME_COSINE, _SAME = 0.9986, 1.0  # 3 degrees and a voxel: poses that came to the same place
+
+
+class GridStage:
+    """One level: pseudo points about the moving surface, all poses at once, against the grid of the held one."""
+
+    def __init__(self, held: Surface, moving: Surface, level: Level, rng: np.random.Generator, threads: int) -> None:
+        voxel = max(held.voxel, moving.voxel)
+        rows = rng.integers(0, len(moving), level.count)
+        self.offsets = rng.normal(0, level.spread * voxel, level.count)
+        self.normals = moving.normals[rows]
+        self.places = moving.places[rows] + self.offsets[:, None] * self.normals
+        self.grid = held.coarse_grid if level.spread > 1 else held.fine_grid
+        self.loss = (max(level.spread, _SHARPEST) * voxel, MIN_COSINE, 3 * (level.spread + 1) * voxel)
+        self.iterations, self.threads = level.iterations, threads
+
+    def step(self, poses: Floats) -> tuple[Floats, Step]:
+        """A Gauss-Newton step of every pose."""
+        H, g, totals = self.grid.robust_sums(self.places, self.normals, self.offsets, poses, *self.loss, self.threads)
+        twists, poses = _core.take_steps(poses, H, g, _stretch(totals), LARGEST_TURN)
+        return poses, Step(twists[0], _rms(totals[0]), int(totals[0, 3]))
+
+    def is_still(self, step: Step) -> bool:
+        """Never: the levels are short, and every pose takes its own steps."""
+        return False
+
+
+def anneal(held: Surface, moving: Surface, poses: Floats, seed: int, threads: int) -> tuple[Floats, Floats]:
+    """The best few of many poses (B, 4, 4), refined level by level, best first, and their scores."""
+    rng = np.random.default_rng(seed)
+    for level in LEVELS:
+        poses, _ = descend(GridStage(held, moving, level, rng, threads), poses)
+        if len(poses) > 1:
+            found = agreement(held, moving, poses, threads, rng.integers(0, len(moving), _SCORED)).score
+            poses = poses[_best_distinct(poses, found, moving, level.keep)]
+    found = agreement(held, moving, poses, threads).score
+    order = np.argsort(-found, kind="stable")
+    return poses[order], found[order]
+
+
+@dataclass(frozen=True, eq=False)
+class Agreement:
+    """How the moving surfels lie on the held surface, for each pose (B,), as shares of all of them.
+
+    agreeing: weighted by how well they agree, normals included. on: within a voxel of the other surface. met: near it
+    at all, agreeing or not.
+    """
+
+    agreeing: Floats
+    on: Floats
+    met: Floats
+
+    def of(self, k: int) -> Agreement:
+        """That of one pose."""
+        return Agreement(self.agreeing[k : k + 1], self.on[k : k + 1], self.met[k : k + 1])
+
+    @property
+    def score(self) -> Floats:
+        """0 to 1: the agreeing share, times the agreeing share of those that meet the other surface at all.
+
+        Planes that slide over planes agree widely, but contradict each other widely too.
+        """
+        return self.agreeing * self.purity
+
+    @property
+    def purity(self) -> Floats:
+        """The agreeing share of what meets the other surface, 0 to 1."""
+        return np.asarray(self.agreeing / np.maximum(self.met, 1e-12))
+
+
+def agreement(
+    held: Surface, moving: Surface, poses: Floats, threads: int, rows: NDArray[np.int64] | slice = slice(None)
+) -> Agreement:
+    """The moving surfels, or some rows of them, on the held surface, for poses (B, 4, 4)."""
+    voxel = max(held.voxel, moving.voxel)
+    places, normals = moving.places[rows], moving.normals[rows]
+    shares = held.coarse_grid.agreement(
+        places, normals, np.ascontiguousarray(poses), voxel, MIN_COSINE, 3 * voxel, threads
+    )
+    return Agreement(*shares.T)
+
+
+class FieldStage:
+    """The last level: pseudo points on the moving surface itself, one pose, against planes of the exact other field."""
+
+    def __init__(
+        self,
+        field: DistanceField,
+        centre: Floats,
+        planes: Planes,
+        neighbours: int,
+        reach: float,
+        extent: float,
+        iterations: int,
+        patience: float,
+    ) -> None:
+        """field: the held one, whose place `centre` (3,) is the origin of the poses. planes: the moving cloud's, about
+        its own origin. reach: from a pseudo point to its partner, a length. extent: of the cloud, a length. patience:
+        the stage ends with a step that is smaller than so many standard errors."""
+        self.field, self.centre, self.planes, self.neighbours = field, centre, planes, neighbours
+        self.reach, self.extent, self.iterations, self.patience = reach, extent, iterations, patience
+        self.partners: Planes | None = None
+        self.H: Floats = np.zeros((6, 6))
+        self.totals: Floats = np.zeros(4)
+        self.twist: Floats = np.zeros(6)
+
+    def step(self, poses: Floats) -> tuple[Floats, Step]:
+        """A Gauss-Newton step; the scale of the weights is that of the residuals themselves."""
+        (G,) = poses
+        x, normals = apply(G, self.planes.mean), rotate(G[:3, :3], self.planes.normal)
+        self.partners = planes_near(self.field, x + self.centre, self.neighbours, self.partners)
+        H, g, totals = _core.robust_sums(
+            x, normals, self.partners.mean - self.centre, self.partners.normal, _spread(self.planes, self.partners),
+            MIN_COSINE, self.reach,
+        )
+        self.H, self.totals = H[0], totals[0]
+        # Far from the end the scale shrinks with the residuals, and a longer step would leap over the end for ever.
+        turns_back = g[0] @ self.twist > 0
+        stretch = np.ones(1) if turns_back else _stretch(totals)
+        (self.twist,), poses = _core.take_steps(poses, H, g, stretch, LARGEST_TURN)
+        return poses, Step(self.twist, self.rmse, int(self.totals[3]))
+
+    def overlap(self, G: Floats) -> Floats:
+        """Centroid (3,) of the pseudo points that have a partner; of all where none has."""
+        x = apply(G, self.planes.mean)
+        assert self.partners is not None
+        away = x - (self.partners.mean - self.centre)
+        near = row_dot(away, away) < self.reach**2
+        return np.asarray(x[near].mean(axis=0) if near.any() else x.mean(axis=0))
+
+    @property
+    def hold_by_chance(self) -> float:
+        """The share of the best held direction's information that noise in the normals gives to any other."""
+        assert self.partners is not None
+        # Each normal's slope has the standard error of a line fit, thickness / (width sqrt(points)).
+        slopes = [np.median(p.thickness / np.maximum(p.width, 1e-300)) for p in (self.planes, self.partners)]
+        return float(slopes[0] ** 2 + slopes[1] ** 2) / self.neighbours
+
+    @property
+    def rmse(self) -> float:
+        """Root of the weighted mean square of the residuals, a length."""
+        return _rms(self.totals)
+
+    def is_still(self, step: Step) -> bool:
+        """Whether the step moved nothing by more than a share of what the residuals leave open."""
+        w, v = np.split(step.increment, 2)
+        moved = np.linalg.norm(w) * self.extent / 2 + np.linalg.norm(v)
+        open_by = step.cost / np.sqrt(max(step.kept, 1))
+        return bool(moved <= max(self.patience * open_by, 1e-14 * self.extent))
+
+
+def _spread(own: Planes, other: Planes) -> Floats:
+    """How widely the residual of each pair of planes scatters (L,), to a common factor.
+
+    Both thicknesses count; the other's more where its points lie sparser, for then several residuals share its noise.
+    """
+    shared = np.ones(len(own.width))
+    np.divide(other.width, own.width, out=shared, where=(own.width > 0) & np.isfinite(own.width + other.width))
+    variance = own.thickness**2 + other.thickness**2 * np.clip(shared**2, 0.1, 10)
+    typical = float(np.median(variance))
+    return np.sqrt(_LEAST_SPREAD + variance / typical) if typical > 0 else np.ones(len(variance))
+
+
+def _stretch(totals: Floats) -> Floats:
+    """By how much to lengthen reweighted steps (B,): the loss bends less than its weights say (Huber, Robust
+    Statistics, 7.8), and the steps come out short by about a third."""
+    return np.asarray(1 / np.clip(totals[:, 2] / np.maximum(totals[:, 0], 1e-300), 0.5, 1.0))
+
+
+def _rms(totals: Floats) -> float:
+    return float(np.sqrt(totals[1] / totals[0])) if totals[0] > 0 else 0.0
+
+
+def _best_distinct(poses: Floats, found: Floats, moving: Surface, count: int) -> list[int]:
+    """The rows of the best poses (B, 4, 4), without those that came to the same place as a better one."""
+    middle = moving.places.mean(axis=0)
+    shifts = poses[:, :3, 3] + poses[:, :3, :3] @ middle
+    chosen: list[int] = []
+    for k in np.argsort(-found, kind="stable"):
+        cosines = (np.einsum("bij,ij->b", poses[chosen, :3, :3], poses[k, :3, :3]) - 1) / 2
+        apart = np.linalg.norm(shifts[chosen] - shifts[k], axis=1)
+        if not ((cosines > _SAME_COSINE) & (apart < _SAME * moving.voxel)).any():
+            chosen.append(int(k))
+        if len(chosen) == count:
+            break
+    return chosen

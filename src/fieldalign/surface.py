@@ -1,0 +1,119 @@
+"""A cloud at one scale: its surfels, and what the search and the coarse alignment look up."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _core
+from .fields.protocol import Floats
+from .lazy import lazy
+
+_NEIGHBOURS = 10       # thinned points in a surfel's plane
+_FLAT, _CLUTTER = 0.5, 0.45  # thickness over width; share of such surfels that furnished rooms, woods and streets have
+_SIEVINGS = 3          # at most
+_CROWD = 4.0           # points in a point's voxel, on average, from which on single ones are taken for outliers
+_FAR = 500.0           # voxels from the middle: what lies further is left out, so that no outlier makes a grid huge
+_PLANAR = 0.05, 3.0    # voxels, along a surfel's shorter axis: neither a line nor scattered points
+_SPARSE = 3.0          # voxels between the surfels that pairs are made of
+_MEMBERS = 1000        # of them at most
+_PAIR_BAND = 6.0, 45.0  # voxels between the two surfels of a pair
+
+
+class Surface:
+    """Surfels, about one for each occupied voxel.
+
+    places, normals: (n, 3), about `origin`; a normal's sign means nothing. voxel: the edge, in the cloud's unit.
+    origin: (3,), a place in the cloud's frame.
+    """
+
+    def __init__(self, points: NDArray[Any], voxel: float, threads: int) -> None:
+        self.voxel = voxel
+        self._threads = threads
+        bounds, _ = _core.survey(points, threads)
+        self.origin = bounds.mean(axis=0)
+        means, _, counts = _core.thin(points, bounds, voxel, threads)
+        thinned = means - self.origin
+        near = np.abs(thinned - np.median(thinned, axis=0)).max(axis=1) < _FAR * voxel
+        thinned = _where(near & (counts >= _least_count(counts)), thinned)
+        for _ in range(_SIEVINGS):
+            places, normals, spread = _core.PointTree(thinned, threads).surfels(thinned, _NEIGHBOURS, threads)
+            thickness, width = spread.T
+            is_flat = thickness < _FLAT * width
+            if is_flat.mean() > _CLUTTER:
+                break
+            thinned = _where(is_flat, thinned)  # mostly outliers: what is flat among them shows the surface
+        thinnest, widest = _PLANAR
+        planar = (width > thinnest * voxel) & (width < widest * voxel)
+        self.places, self.normals = _where(planar, places), _where(planar, normals)
+
+    def __len__(self) -> int:
+        return len(self.places)
+
+    @lazy
+    def extent(self) -> float:
+        """The diagonal of the surfels' bounds."""
+        return float(np.linalg.norm(np.ptp(self.places, axis=0)))
+
+    @lazy
+    def sparse(self) -> NDArray[np.uint32]:
+        """Rows of some surfels, spread evenly, at most a thousand."""
+        bounds = np.stack([self.places.min(axis=0), self.places.max(axis=0)])
+        edge = _SPARSE * self.voxel
+        while True:
+            rows = _core.thin(self.places, bounds, edge, self._threads)[1]
+            if len(rows) <= _MEMBERS:
+                return rows
+            edge *= 1.05 * float(np.sqrt(len(rows) / _MEMBERS))
+
+    @lazy
+    def coarse_grid(self) -> _core.ClosestGrid:
+        """The nearest surfel up to six voxels off, in cells of two voxels."""
+        return _core.ClosestGrid(self.places, self.normals, 2 * self.voxel, 6 * self.voxel)
+
+    @lazy
+    def fine_grid(self) -> _core.ClosestGrid:
+        """The nearest surfel up to three voxels off, in cells of a voxel."""
+        return _core.ClosestGrid(self.places, self.normals, self.voxel, 3 * self.voxel)
+
+    @lazy
+    def pairs(self) -> _core.PairTable:
+        """Pairs of the sparse surfels, to be looked up by what no motion changes."""
+        shortest, longest = (self.voxel * length for length in _PAIR_BAND)
+        rows = self.sparse
+        return _core.PairTable(self.places[rows], self.normals[rows], shortest, longest, self._threads)
+
+
+def main_axes(held: Surface, moving: Surface) -> list[Floats]:
+    """The four motions (4, 4) that lay the main axes of one surface on those of the other, middle on middle."""
+    (middle, axes), (onto_middle, onto_axes) = (_axes(surface.places) for surface in (moving, held))
+    motions = []
+    for signs in ((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)):
+        T = np.eye(4)
+        T[:3, :3] = (onto_axes * signs) @ axes.T
+        T[:3, 3] = onto_middle - T[:3, :3] @ middle
+        motions.append(T)
+    return motions
+
+
+def _axes(places: Floats) -> tuple[Floats, Floats]:
+    """Middle (3,) and main axes (3, 3), right-handed, in columns."""
+    middle = places.mean(axis=0)
+    away = places - middle
+    axes = np.linalg.eigh(np.einsum("ni,nj->ij", away, away))[1]  # no BLAS, whose sums may change with its threads
+    axes[:, 0] *= np.linalg.det(axes)
+    return middle, axes
+
+
+def _least_count(counts: NDArray[np.uint32]) -> int:
+    """How many points a voxel of the surface holds at least: where most points have many neighbours, one that has none
+    is an outlier; else it may be a surface far away."""
+    crowd = float((counts.astype(float) ** 2).sum() / counts.sum())  # in the voxel of a point, on average
+    return 2 if crowd > _CROWD else 1
+
+
+def _where(chosen: NDArray[np.bool_], rows: Floats) -> Floats:
+    """The chosen rows; all of them where hardly any is: a cloud without a surface is judged later, not here."""
+    return rows if chosen.all() or chosen.sum() < 10 else np.ascontiguousarray(rows[chosen])

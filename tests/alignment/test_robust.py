@@ -1,0 +1,247 @@
+"""The levels of the robust alignment: each brings poses nearer, and what is said of them is the truth."""
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from fieldalign.alignment import descend
+from fieldalign.alignment.robust import LEVELS, FieldStage, GridStage, agreement, anneal
+from fieldalign.clouds.simulated import simulate_pair
+from fieldalign.evaluation import rotation_error, translation_error
+from fieldalign.fields import PointField
+from fieldalign.fields.protocol import planes_near
+from fieldalign.motions import apply, exp_twist, inverse, rotate, translation
+from fieldalign.surface import Surface
+
+VOXEL = 0.15
+
+
+@lru_cache
+def room(seed=3):
+    """Two surfaces and their fields, and the true pose G of the moving one in the held one, about the origins."""
+    pair = simulate_pair(seed, 20_000)
+    held, moving = (Surface(cloud.points, VOXEL, 2) for cloud in (pair.source, pair.target))
+    G = translation(-held.origin) @ inverse(pair.T_target_source) @ translation(moving.origin)
+    return held, moving, PointField(pair.source.points), PointField(pair.target.points), G
+
+
+def near(G, rng, degrees, shift, n=1):
+    """Poses (n, 4, 4) so far off G."""
+    w, v = rng.normal(size=(2, n, 3))
+    w *= np.radians(degrees) / np.linalg.norm(w, axis=1)[:, None]
+    v *= shift / np.linalg.norm(v, axis=1)[:, None]
+    return np.stack([exp_twist(np.r_[a, b]) @ G for a, b in zip(w, v, strict=True)])
+
+
+def degrees_off(poses, G):
+    return np.array([rotation_error(pose, G) for pose in poses])
+
+
+# ------------------------------------------------------------------------------------------------------- coarse levels
+
+
+@pytest.mark.parametrize(("level", "degrees", "shift"), [(0, 12, 0.3), (1, 2, 0.1), (2, 1, 0.04)])
+def test_each_level_brings_poses_nearer(rng, level, degrees, shift):
+    held, moving, _, _, G = room()
+    start = near(G, rng, degrees, shift, 20)
+    stage = GridStage(held, moving, LEVELS[level], rng, 2)
+    found, steps = descend(stage, start)
+    assert len(steps) == LEVELS[level].iterations
+    assert np.median(degrees_off(found, G)) < degrees / 3
+    assert (degrees_off(found, G) < degrees_off(start, G)).mean() >= 0.9
+
+
+def test_a_stage_moves_each_pose_alone(rng):
+    held, moving, _, _, G = room()
+    start = near(G, rng, 5, 0.1, 4)
+    stage = GridStage(held, moving, LEVELS[1], rng, 2)
+    together, _ = stage.step(start)
+    for k in range(4):
+        alone, step = stage.step(start[k : k + 1])
+        assert np.array_equal(alone[0], together[k])
+        assert np.allclose(exp_twist(step.increment) @ start[k], alone[0], atol=1e-12)
+        assert 0 < step.kept <= LEVELS[1].count
+
+
+def test_pseudo_points_lie_along_the_normals(rng):
+    held, moving, _, _, _ = room()
+    stage = GridStage(held, moving, LEVELS[0], rng, 1)
+    feet = stage.places - stage.offsets[:, None] * stage.normals
+    assert cKDTree(moving.places).query(feet)[0].max() < 1e-12
+    assert len(stage.places) == LEVELS[0].count
+    assert stage.offsets.std() == pytest.approx(LEVELS[0].spread * VOXEL, rel=0.2)
+    assert abs(stage.offsets.mean()) < 0.3 * stage.offsets.std()
+
+
+def test_annealing_finds_the_right_one_among_wrong_poses(rng):
+    held, moving, _, _, G = room()
+    wrong = np.stack([exp_twist(np.r_[2 * rng.normal(size=3), rng.normal(size=3)]) for _ in range(30)])
+    poses, scores = anneal(held, moving, np.concatenate([wrong, near(G, rng, 8, 0.2, 2)]), 0, 2)
+    assert rotation_error(poses[0], G) < 0.5
+    assert translation_error(poses[0], G) < 0.05
+    assert (np.diff(scores) <= 0).all()
+    assert len(poses) <= LEVELS[-1].keep
+    assert np.array_equal(scores, agreement(held, moving, poses, 2).score)
+
+
+def test_poses_that_come_to_one_place_are_one(rng):
+    """Of many starts near the truth a single pose is left of those within 3 degrees and a voxel of it."""
+    held, moving, _, _, G = room()
+    poses, _ = anneal(held, moving, near(G, rng, 5, 0.1, 30), 0, 2)
+    same = (degrees_off(poses, G) < 1.5) & (np.linalg.norm(poses[:, :3, 3] - G[:3, 3], axis=1) < 0.3 * VOXEL)
+    assert same.sum() == 1
+
+
+def test_annealing_has_the_same_bits_at_any_number_of_threads(rng):
+    held, moving, _, _, G = room()
+    start = near(G, rng, 8, 0.2, 10)
+    one = anneal(held, moving, start, 0, 1)
+    for threads in (2, 3, 8):
+        again = anneal(held, moving, start, 0, threads)
+        assert np.array_equal(again[0], one[0])
+        assert np.array_equal(again[1], one[1])
+
+
+# ---------------------------------------------------------------------------------------------------------- agreement
+
+
+def test_a_surface_agrees_with_itself():
+    held, *_ = room()
+    itself = agreement(held, held, np.eye(4)[None], 1)
+    assert itself.met[0] == 1
+    assert itself.on[0] > 0.97
+    assert 0.85 < itself.agreeing[0] <= 1
+    assert itself.score[0] == pytest.approx(itself.agreeing[0] ** 2)
+
+
+def test_shares_are_shares_and_ordered(rng):
+    held, moving, _, _, G = room()
+    poses = np.concatenate([near(G, rng, angle, shift, 5) for angle, shift in ((0.1, 0), (5, 0.1), (90, 1), (9, 50))])
+    found = agreement(held, moving, poses, 2)
+    for shares in (found.agreeing, found.on, found.met, found.purity, found.score):
+        assert shares.shape == (20,)
+        assert (shares >= 0).all()
+        assert (shares <= 1).all()
+    assert (found.on <= found.met).all()
+    assert (found.agreeing <= found.met).all()
+    assert found.score[:5].min() > 2 * found.score[5:].max()
+    assert not found.met[15:].any()
+    assert not found.score[15:].any()  # and no division by nothing
+    assert np.array_equal(found.of(3).agreeing, found.agreeing[3:4])
+
+
+def test_a_detail_is_wholly_on_the_whole_and_not_the_reverse():
+    held, *_ = room()
+    points = simulate_pair(3, 20_000).source.points
+    part = Surface(points[np.linalg.norm(points - points[0], axis=1) < 1.5], VOXEL, 1)
+    G = translation(part.origin - held.origin)
+    assert agreement(held, part, G[None], 1).on[0] > 0.95
+    share = len(part) / len(held)
+    assert agreement(part, held, inverse(G)[None], 1).on[0] == pytest.approx(share, abs=0.3 * share)
+
+
+def test_some_rows_stand_for_all(rng):
+    held, moving, _, _, G = room()
+    all_of_them = agreement(held, moving, G[None], 1)
+    some = agreement(held, moving, G[None], 1, rng.integers(0, len(moving), 2000))
+    assert some.agreeing[0] == pytest.approx(all_of_them.agreeing[0], abs=0.05)
+
+
+def test_a_shifted_sheet_agrees_less_and_less():
+    """A plane on a plane, raised: on it up to a voxel, met further up, and its weight is Geman and McClure's."""
+    u, v = np.meshgrid(np.arange(0, 4, 0.02), np.arange(0, 4, 0.02))
+    sheet = Surface(np.c_[u.ravel(), v.ravel(), 0 * u.ravel()], 0.2, 1)
+    heights = np.array([0.0, 0.05, 0.15, 0.25, 0.45, 2.0])
+    poses = np.stack([translation([0, 0, height]) for height in heights])
+    found = agreement(sheet, sheet, poses, 1)
+    assert np.allclose(found.agreeing[:4], 1 / (1 + (heights[:4] / 0.2) ** 2) ** 2, atol=0.01)
+    assert np.allclose(found.on, heights < 0.2, atol=0.05)
+    assert np.allclose(found.met[:5], 1)
+    assert found.met[5] == 0
+
+
+# --------------------------------------------------------------------------------------------------------- last level
+
+
+def last_level(rng, iterations=30, patience=0.0, neighbours=10):
+    held, moving, held_field, moving_field, _ = room()
+    planes = planes_near(moving_field, moving_field.spread(3000), neighbours).about(moving.origin)
+    return FieldStage(held_field, held.origin, planes, neighbours, 0.6 * VOXEL, held.extent, iterations, patience)
+
+
+def test_the_last_level_is_far_finer_than_a_voxel(rng):
+    *_, G = room()
+    for start in near(G, rng, 0.8, 0.03, 5):
+        (found,), _ = descend(last_level(rng), start[None])
+        assert rotation_error(found, G) < 0.05
+        assert translation_error(found, G) < VOXEL / 50
+
+
+def test_it_ends_where_it_began_when_it_is_there(rng):
+    *_, G = room()
+    (there,), _ = descend(last_level(rng, 60), G[None])
+    (again,), steps = descend(last_level(rng, 60), there[None])
+    assert np.abs(again - there).max() < 1e-6
+    assert np.linalg.norm(steps[0].increment) < 1e-6
+
+
+def test_patience_is_in_standard_errors(rng):
+    *_, G = room()
+    start = near(G, rng, 0.8, 0.03)
+    lengths = [len(descend(last_level(rng, 40, patience), start)[1]) for patience in (10.0, 1.0, 0.1, 1e-3)]
+    assert lengths == sorted(lengths)
+    assert lengths[0] < lengths[-1]
+
+
+def test_what_the_last_level_saw_is_told(rng):
+    held, _, held_field, _, G = room()
+    stage = last_level(rng)
+    (found,), steps = descend(stage, G[None])
+    assert stage.rmse == steps[-1].cost
+    assert 0.0005 < stage.rmse < 0.01  # the scans have 5 mm of noise, planes through ten points less
+    assert np.allclose(stage.H, stage.H.T)
+    assert np.linalg.eigvalsh(stage.H).min() > 0
+    centroid = stage.overlap(found)
+    assert cKDTree(held_field.points - held.origin).query(centroid)[0] < 3
+    low, high = held.places.min(axis=0), held.places.max(axis=0)
+    assert (low < centroid).all()
+    assert (centroid < high).all()
+
+
+def test_where_nothing_is_near_the_last_level_stays(rng):
+    *_, G = room()
+    away = translation([1e3, 0, 0]) @ G
+    stage = last_level(rng)
+    (found,), steps = descend(stage, away[None])
+    assert np.array_equal(found, away)
+    assert (steps[-1].kept, stage.rmse) == (0, 0)
+    assert np.allclose(stage.overlap(away), apply(away, stage.planes.mean).mean(axis=0))
+
+
+class Box:
+    """The signed field of a box about the origin, as a user may write it."""
+
+    signed = True
+    half = np.array([1.0, 0.7, 0.4])
+    bounds = np.stack([-half, half])
+
+    def sample(self, x):
+        outside = np.abs(x) - self.half
+        beyond = np.maximum(outside, 0)
+        value = np.linalg.norm(beyond, axis=1) + np.minimum(outside.max(axis=1), 0)
+        direction = np.where(value[:, None] > 0, beyond, np.eye(3)[outside.argmax(axis=1)]) * np.where(x < 0, -1, 1)
+        gradient = direction / np.linalg.norm(direction, axis=1, keepdims=True)
+        return value, gradient, x - value[:, None] * gradient, gradient
+
+
+def test_a_formula_is_met_to_the_last_digits(rng):
+    places = Box().sample(rng.uniform(-1.1, 1.1, (3000, 3)))[2]
+    G = exp_twist(np.r_[0.02 * rng.normal(size=3), 0.01 * rng.normal(size=3)])
+    own = planes_near(Box(), places, 10)
+    moved = replace(own, mean=apply(inverse(G), own.mean), normal=rotate(inverse(G)[:3, :3], own.normal))
+    stage = FieldStage(Box(), np.zeros(3), moved, 10, 0.3, 2.6, 40, 0)
+    (found,), _ = descend(stage, np.eye(4)[None])
+    assert np.abs(found - G).max() < 1e-9
