@@ -5,7 +5,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 SOURCES := $(shell find src cpp -name '*.py' -o -name '*.hpp' -o -name '*.cpp' -o -name '*.pyi') CMakeLists.txt pyproject.toml
 
-.PHONY: demo test lint bench-paper wheels clean
+.PHONY: demo test lint bench-paper bench-any-pose wheels clean
 
 demo: $(VENV)/.installed-viz      ## simulate two scans of a room, register them, compare with the truth
 	$(BIN)/fieldalign demo --output demo
@@ -15,15 +15,20 @@ test: $(VENV)/.installed-test     ## lint, types, and the whole test suite
 	$(BIN)/mypy
 	$(BIN)/pytest
 
-bench-paper: $(VENV)/.installed-bench  ## the figures of the paper's method; needs ../shared/data or $FIELDALIGN_DATA
+bench-paper: $(VENV)/.installed-viz  ## the figures of the paper's method; needs ../shared/data or $FIELDALIGN_DATA
 	$(BIN)/python benchmarks/paper.py --output docs/benchmarks
 
-wheels: $(VENV)/.installed-bench  ## wheels for this platform, as CI builds them
+# The peers bring packages of their own, among them a plugin of pytest: they get an environment of their own.
+bench-any-pose:                   ## search and accuracy from any pose, beside the peers; same data, two hours
+	$(MAKE) VENV=$(VENV)-bench $(VENV)-bench/.installed-bench
+	$(VENV)-bench/bin/python benchmarks/any_pose.py --output docs/benchmarks
+
+wheels: $(VENV)/bin/python        ## wheels for this platform, as CI builds them
 	$(BIN)/pip install --quiet cibuildwheel
 	$(BIN)/cibuildwheel --output-dir dist
 
 clean:
-	rm -rf $(VENV) build dist demo .mypy_cache .ruff_cache .pytest_cache
+	rm -rf $(VENV) $(VENV)-bench build dist demo .mypy_cache .ruff_cache .pytest_cache
 
 $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)

@@ -106,7 +106,7 @@ def objects(seeds: int) -> list[dict]:
                     T = exp_twist(np.array(twist))
                     source, target = fa.prepare(points), fa.prepare(apply(T, points))
                     for seed in range(seeds):
-                        result = fa.register(source, target, settings=preset, seed=seed)
+                        result = fa.register(source, target, method="paper", settings=preset, seed=seed)
                         errors.append(rotation_error(result.T_target_source, T))
                 errors = np.array(errors)
                 rows.append({
@@ -153,12 +153,12 @@ def timing(runs: int) -> list[dict]:
         for name, (source, target, preset, *_) in cases.items():
             for threads in (None, 1):
                 start = time.perf_counter()
-                result = fa.register(source, target, settings=preset, threads=threads)
+                result = fa.register(source, target, method="paper", settings=preset, threads=threads)
                 samples.setdefault((name, threads, "arrays"), []).append((time.perf_counter() - start, result.seconds))
             fixed = fa.prepare(target)
             fixed.features(fa.PRESETS[preset], 0, None)
             start = time.perf_counter()
-            result = fa.register(source, fixed, settings=preset)
+            result = fa.register(source, fixed, method="paper", settings=preset)
             taken = time.perf_counter() - start, result.seconds
             samples.setdefault((name, None, "target prepared"), []).append(taken)
     rows = []
@@ -185,7 +185,7 @@ def growth(runs: int, largest: float) -> dict:
         taken = []
         for _ in range(runs):
             start = time.perf_counter()
-            fa.register(source, target)
+            fa.register(source, target, method="paper")
             taken.append(time.perf_counter() - start)
         medians.append(1e3 * float(np.median(taken)))
         print("   ", n, round(medians[-1], 1), "ms", flush=True)
