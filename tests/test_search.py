@@ -200,7 +200,7 @@ def test_a_normals_sign_changes_no_bit(rng):
 
     plain = found(np.ones(len(held)), np.ones(len(moving)))
     flipped = found(rng.choice([-1.0, 1.0], len(held)), rng.choice([-1.0, 1.0], len(moving)))
-    assert plain[2] == flipped[2] > 1000
+    assert plain[2] == flipped[2] > 100
     assert np.array_equal(plain[0], flipped[0])
     assert np.array_equal(plain[1], flipped[1])
 
