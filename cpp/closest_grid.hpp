@@ -22,9 +22,8 @@ inline float dot(Vec3f a, Vec3f b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 // A plane of the surface: half a cache line.
 struct alignas(32) Plane {
   Vec3f mean;
-  float weight;
+  float weight;  // 1; 0 for the plane that stands for none
   Vec3f normal;
-  float offset;  // of a pseudo point from its surface, along the normal; 0 for the surface itself
 };
 
 class ClosestGrid {
@@ -94,7 +93,7 @@ inline ClosestGrid::ClosestGrid(std::vector<Plane> planes, float cell, float mar
   cells_.assign(kCells, none_);
   spread(margin);
   constexpr float far = 1e18f;  // its square is a float still
-  planes_.push_back({{far, far, far}, 0, {1, 0, 0}, 0});
+  planes_.push_back({{far, far, far}, 0, {1, 0, 0}});
 }
 
 // The place of a cell among the cells, its block opened where it was not.

@@ -52,7 +52,7 @@ struct Confinement {
   Pose guess;
   Vec3f pivot;        // a place of the probes' cloud
   float radius;
-  float cosine;       // of the largest angle, 1 degree less than -1 for any
+  float cosine;       // of the largest angle
 };
 
 inline float trace_of_difference(const Pose& a, const Pose& b) {

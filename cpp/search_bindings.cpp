@@ -25,7 +25,7 @@ std::vector<Plane> planes_of(const Points<double>& means, const Points<double>& 
   check_lengths(means.shape(0), {normals.shape(0)});
   std::vector<Plane> planes(means.shape(0));
   for (std::size_t i = 0; i < planes.size(); ++i)
-    planes[i] = {narrow(view(means)[i]), 1, narrow(view(normals)[i]), 0};
+    planes[i] = {narrow(view(means)[i]), 1, narrow(view(normals)[i])};
   return planes;
 }
 

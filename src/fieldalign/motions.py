@@ -55,6 +55,11 @@ def adjoint(T: Matrix) -> Matrix:
     return Ad
 
 
+def reach_of(twist: Matrix, extent: float) -> float:
+    """How far a twist (6,) moves places of a cloud of this extent about its middle, at most."""
+    return float(np.linalg.norm(twist[:3]) * extent / 2 + np.linalg.norm(twist[3:]))
+
+
 def nearest_rotation(R: Matrix) -> Matrix:
     """The rotation (3, 3) nearest to R; for one that is nearly a rotation, it undoes the rounding of many products."""
     U, _, Vt = np.linalg.svd(R)

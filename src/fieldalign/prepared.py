@@ -80,7 +80,7 @@ class PreparedCloud:
         if not isinstance(self.field, PointField):
             places = draw_places(self.field, _SURFACE_SAMPLES, np.random.default_rng(0))
             return PointField(places, threads=self._threads)
-        points, scale = self.field.points, scale_of(self.field.points, self._threads)
+        points, scale = self.field.points, self._whole_scale
         inside = within(scale.core, points, self.field.bounds)
         if len(inside) > _FINE:
             bounds, _ = _core.survey(inside, self._threads)
@@ -90,7 +90,13 @@ class PreparedCloud:
     @lazy
     def scale(self) -> Scale:
         """The lengths that the cloud itself suggests."""
-        return scale_of(self.fine.points, self._threads)
+        return self._whole_scale if self.fine is self.field else scale_of(self.fine.points, self._threads)
+
+    @lazy
+    def _whole_scale(self) -> Scale:
+        """The scale of all points of a cloud, before any thinning."""
+        assert isinstance(self.field, PointField)
+        return scale_of(self.field.points, self._threads)
 
     def surface(self, voxel: float) -> Surface:
         """The surfels at about this voxel, kept for the next pair: at the nearest rung of a ladder of quarter octaves

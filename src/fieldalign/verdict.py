@@ -12,7 +12,7 @@ from .alignment.residual import feature_gradient, row_dot
 from .alignment.robust import Agreement
 from .fields import FieldSample, sampled
 from .fields.protocol import Floats
-from .motions import apply, inverse, rotate
+from .motions import apply, inverse, reach_of, rotate
 from .prepared import PreparedCloud
 from .result import Reason
 
@@ -34,8 +34,7 @@ class Certainty:
 
 def judge(alignment: Alignment, source: PreparedCloud, overlap: tuple[float, float]) -> Reason:
     """Whether enough pseudo points and surface remain, and the last increment moves no point of the source far."""
-    w, v = np.split(alignment.steps[-1].increment, 2)
-    moves = np.linalg.norm(w) * source.extent / 2 + np.linalg.norm(v)
+    moves = reach_of(alignment.steps[-1].increment, source.extent)
     if not alignment.strict or max(overlap) < MIN_OVERLAP:
         return Reason.LOW_OVERLAP
     return Reason.NOT_CONVERGED if moves > STILL * source.extent else Reason.ACCEPTED

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from .. import _core
 from ..fields.protocol import DistanceField, Floats, Planes, planes_near
-from ..motions import apply, rotate
+from ..motions import apply, reach_of, rotate
 from ..surface import Surface
 from .residual import row_dot
 from .solver import Step, descend
@@ -182,8 +182,7 @@ class FieldStage:
 
     def is_still(self, step: Step) -> bool:
         """Whether the step moved nothing by more than a share of what the residuals leave open."""
-        w, v = np.split(step.increment, 2)
-        moved = np.linalg.norm(w) * self.extent / 2 + np.linalg.norm(v)
+        moved = reach_of(step.increment, self.extent)
         open_by = step.cost / np.sqrt(max(step.kept, 1))
         return bool(moved <= max(self.patience * open_by, 1e-14 * self.extent))
 

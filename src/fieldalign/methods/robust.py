@@ -20,7 +20,7 @@ from ..alignment.robust import Agreement, FieldStage, agreement, anneal
 from ..clock import Clock
 from ..fields import PointField
 from ..fields.protocol import Floats, planes_near
-from ..motions import adjoint, apply, inverse, nearest_rotation, translation
+from ..motions import adjoint, apply, inverse, nearest_rotation, reach_of, translation
 from ..prepared import PreparedCloud
 from ..result import Reason, RegistrationResult
 from ..scale import common_voxel
@@ -169,8 +169,7 @@ def _result(pair: Pair, refined: Refined, there: Agreement, back: Agreement, riv
     T = pair.motion(refined.G)
     last = refined.last
     known = _certainty(pair, refined, T)
-    w, v = np.split(refined.steps[-1].increment, 2)
-    moved = float(np.linalg.norm(w) * last.extent / 2 + np.linalg.norm(v))
+    moved = reach_of(refined.steps[-1].increment, last.extent)
     reason = judge_robust(there, back, known, rivals, has_converged=moved <= STILL * last.extent)
     on_source, on_target = (there, back) if pair.is_swapped else (back, there)
     return RegistrationResult(
