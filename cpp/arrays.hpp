@@ -1,6 +1,8 @@
 // NumPy arrays as the bindings take and give them.
 #pragma once
 
+#include <initializer_list>
+#include <stdexcept>
 #include <vector>
 
 #include <nanobind/nanobind.h>
@@ -31,6 +33,11 @@ Array<T> array(std::vector<T>&& values, std::initializer_list<std::size_t> shape
   auto* kept = new std::vector<T>(std::move(values));
   nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<std::vector<T>*>(p); });
   return Array<T>(kept->data(), shape, owner);
+}
+
+inline void check_lengths(std::size_t n, std::initializer_list<std::size_t> others) {
+  for (const std::size_t other : others)
+    if (other != n) throw std::invalid_argument("arrays differ in length");
 }
 
 }  // namespace fieldalign

@@ -181,21 +181,16 @@ Array<double> moments(Points<double> x, Points<double> g) {
   return array(std::move(rows), {x.shape(0), 6});
 }
 
-void check_rows(std::size_t n, std::initializer_list<std::size_t> others) {
-  for (const std::size_t other : others)
-    if (other != n) throw std::invalid_argument("J, r and w differ in length");
-}
-
 Array<double> twist_array(const Twist& x) { return array(std::vector<double>(x.begin(), x.end()), {6}); }
 
 Array<double> direct(Rows6 J, Values r) {
-  check_rows(J.shape(0), {r.shape(0)});
+  check_lengths(J.shape(0), {r.shape(0)});
   const std::vector<double> ones(J.shape(0), 1);
   return twist_array(solve(normal_equations(J.data(), r.data(), ones.data(), J.shape(0))));
 }
 
 auto reweighted(Rows6 J, Values r, Values w, double floor, double unit, double tolerance, int steps) {
-  check_rows(J.shape(0), {r.shape(0), w.shape(0)});
+  check_lengths(J.shape(0), {r.shape(0), w.shape(0)});
   std::vector<double> weights(w.data(), w.data() + w.shape(0));
   Twist x;
   {
@@ -206,7 +201,7 @@ auto reweighted(Rows6 J, Values r, Values w, double floor, double unit, double t
 }
 
 Array<double> information(Rows6 J, Values w) {
-  check_rows(J.shape(0), {w.shape(0)});
+  check_lengths(J.shape(0), {w.shape(0)});
   const std::vector<double> zeros(J.shape(0), 0);
   const Square<6> H = normal_equations(J.data(), zeros.data(), w.data(), J.shape(0)).H;
   std::vector<double> rows;

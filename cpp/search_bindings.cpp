@@ -16,11 +16,6 @@ namespace {
 Vec3f narrow(Vec3 p) { return {static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)}; }
 Vec3 widen(Vec3f p) { return {p.x, p.y, p.z}; }
 
-void check_lengths(std::size_t n, std::initializer_list<std::size_t> others) {
-  for (const std::size_t other : others)
-    if (other != n) throw std::invalid_argument("arrays differ in length");
-}
-
 std::vector<Plane> planes_of(const Points<double>& means, const Points<double>& normals) {
   check_lengths(means.shape(0), {normals.shape(0)});
   std::vector<Plane> planes(means.shape(0));
