@@ -5,7 +5,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 SOURCES := $(shell find src cpp -name '*.py' -o -name '*.hpp' -o -name '*.cpp' -o -name '*.pyi') CMakeLists.txt pyproject.toml
 
-.PHONY: demo test lint bench-paper bench-any-pose wheels clean
+.PHONY: demo test lint bench-paper bench-any-pose bench-verdict wheels clean
 
 demo: $(VENV)/.installed-viz      ## simulate two scans of a room, register them, compare with the truth
 	$(BIN)/fieldalign demo --output demo
@@ -22,6 +22,10 @@ bench-paper: $(VENV)/.installed-viz  ## the figures of the paper's method; needs
 bench-any-pose:                   ## search and accuracy from any pose, beside the peers; same data, two hours
 	$(MAKE) VENV=$(VENV)-bench $(VENV)-bench/.installed-bench
 	$(VENV)-bench/bin/python benchmarks/any_pose.py --output docs/benchmarks
+
+bench-verdict:                    ## false and true acceptances, ROC and covariance beside the peers; an hour
+	$(MAKE) VENV=$(VENV)-bench $(VENV)-bench/.installed-bench
+	$(VENV)-bench/bin/python benchmarks/verdict.py --output docs/benchmarks
 
 wheels: $(VENV)/bin/python        ## wheels for this platform, as CI builds them
 	$(BIN)/pip install --quiet cibuildwheel

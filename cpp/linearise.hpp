@@ -22,7 +22,7 @@ struct RobustLoss {
 
 struct Residual {
   double r, cosine;
-  Vec3 between;
+  Vec3 between, normal;  // N, and n with the sign that n' has
 };
 
 // Nothing where the pseudo point is truncated.
@@ -35,13 +35,18 @@ inline std::optional<Residual> residual(Vec3 x, Vec3 own_normal, double offset, 
   if (!(cosine >= loss.min_cosine)) return {};
   Vec3 between = normal + own_normal;
   between = (1 / std::sqrt(dot(between, between))) * between;
-  return Residual{dot(between, away) - offset * dot(between, own_normal), cosine, between};
+  return Residual{dot(between, away) - offset * dot(between, own_normal), cosine, between, normal};
 }
 
 // Geman and McClure's weight (1 + z^2)^-2 of z = r / (scale spread), times the cosine between the normals.
 inline double weight_of(const Residual& found, double spread, const RobustLoss& loss) {
   const double z = found.r / (loss.scale * spread), falloff = 1 / (1 + z * z);
   return found.cosine * falloff * falloff;
+}
+
+inline Twist row_of(Vec3 place, Vec3 normal) {
+  const Vec3 moment = cross(place, normal);
+  return {moment.x, moment.y, moment.z, normal.x, normal.y, normal.z};
 }
 
 // What one pose's pseudo points add up to for its next step.
@@ -55,8 +60,7 @@ struct StepSums {
   void add(Vec3 x, const Residual& found, double spread, const RobustLoss& loss) {
     const double w = weight_of(found, spread, loss) / (spread * spread);
     const double z = found.r / (loss.scale * spread);
-    const Vec3 n = found.between, moment = cross(x, n);
-    const double row[6] = {moment.x, moment.y, moment.z, n.x, n.y, n.z};
+    const Twist row = row_of(x, found.between);
     for (int a = 0; a < 6; ++a) {
       const double weighted = w * row[a];
       equations.g[a] += weighted * found.r;
@@ -64,22 +68,50 @@ struct StepSums {
     }
     weights += w;
     squares += w * found.r * found.r;
-    curvature += w * (1 - 4 * z * z / (1 + z * z));
+    curvature += w * (4 / (1 + z * z) - 3);
     ++kept;
+  }
+};
+
+// What the residuals at the end tell of the pose's certainty.
+struct CertaintySums {
+  static constexpr int kRun = 16;  // pseudo points: neighbours in space, whose errors may go together
+
+  Square<6> hold{};     // sum of weight J^T J', J of one cloud's planes, J' of the other's
+  Square<6> scatter{};  // of the gradient: sum over runs of g g^T
+  Twist run{};          // g of the run that is not over yet
+  int length = 0;
+
+  // The noise of the two clouds' normals is not the same, so that it cancels from the product: a plane, whose normals
+  // differ by noise alone, does not hold a pose that slides on it.
+  void add(Vec3 x, Vec3 own_normal, Vec3 mean, const Residual& found, double spread, const RobustLoss& loss) {
+    const double w = weight_of(found, spread, loss) / (spread * spread);
+    const Twist own = row_of(x, own_normal), other = row_of(mean, found.normal), row = row_of(x, found.between);
+    for (int a = 0; a < 6; ++a) {
+      run[a] += w * found.r * row[a];
+      for (int b = 0; b < 6; ++b) hold[a][b] += w / 2 * (own[a] * other[b] + other[a] * own[b]);
+    }
+    if (++length == kRun) end_run();
+  }
+  void end_run() {
+    for (int a = 0; a < 6; ++a)
+      for (int b = 0; b < 6; ++b) scatter[a][b] += run[a] * run[b];
+    run = {}, length = 0;
   }
 };
 
 // How well one pose lays surfels on the other surface.
 struct AgreementSums {
-  double agreeing = 0;  // sum of weights: 1 for each surfel where the surfaces coincide
-  int on = 0;           // on the other surface: within the scale across, and twice that in all
-  int met = 0;          // near the other surface at all
+  double agreeing = 0;  // the surfels' weights, where the surfaces coincide whole, else in part
+  double met = 0;       // the weights of those near the other surface at all
+  int on = 0;           // how many are on the other surface: within the scale across, and twice that in all
 
-  void add(Vec3 x, Vec3 own_normal, Vec3 mean, Vec3 normal, const RobustLoss& loss) {
-    ++met;
+  void add(Vec3 x, Vec3 own_normal, double weight, Vec3 mean, Vec3 normal, const RobustLoss& loss) {
+    met += weight;
     const Vec3 away = x - mean;
     on += dot(away, away) < 4 * loss.scale * loss.scale && std::abs(dot(away, normal)) < loss.scale;
-    if (const auto found = residual(x, own_normal, 0, mean, normal, loss)) agreeing += weight_of(*found, 1, loss);
+    const auto found = residual(x, own_normal, 0, mean, normal, loss);
+    if (found) agreeing += weight * weight_of(*found, 1, loss);
   }
 };
 

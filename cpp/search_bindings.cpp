@@ -6,6 +6,8 @@
 #include "linearise.hpp"
 #include "motion.hpp"
 #include "search.hpp"
+#include "sight.hpp"
+#include "surfels.hpp"
 
 namespace fieldalign {
 
@@ -104,25 +106,30 @@ nb::tuple grid_sums(const ClosestGrid& grid, Points<double> places, Points<doubl
   return arrays_of(sums);
 }
 
-// For each pose the shares of all surfels that agree, are on, and meet the surface (b, 3).
-Array<double> grid_agreement(const ClosestGrid& grid, Points<double> places, Points<double> normals, Matrices4 poses,
-                             double scale, double min_cosine, double reach, int threads) {
+// For each pose the weights of the surfels that agree with and that meet the surface, and the share of those on it (b, 3).
+Array<double> grid_agreement(const ClosestGrid& grid, Points<double> places, Points<double> normals, Values weights,
+                             Matrices4 poses, double scale, double min_cosine, double reach, int threads) {
   const std::size_t n = places.shape(0), b = poses.shape(0);
-  check_lengths(n, {normals.shape(0)});
+  check_lengths(n, {normals.shape(0), weights.shape(0)});
   std::vector<AgreementSums> sums(b);
   {
     nb::gil_scoped_release free;
     const RobustLoss loss{scale, min_cosine, reach};
     meet(grid, view(places), view(normals), poses, threads,
-         [&](std::size_t k, std::size_t, Vec3 x, Vec3 normal, const Plane& plane) {
-           sums[k].add(x, normal, widen(plane.mean), widen(plane.normal), loss);
+         [&](std::size_t k, std::size_t i, Vec3 x, Vec3 normal, const Plane& plane) {
+           sums[k].add(x, normal, weights.data()[i], widen(plane.mean), widen(plane.normal), loss);
          });
   }
   std::vector<double> shares;
   for (const AgreementSums& s : sums)
-    for (const double sum : {s.agreeing, static_cast<double>(s.on), static_cast<double>(s.met)})
-      shares.push_back(sum / static_cast<double>(n));
+    shares.insert(shares.end(), {s.agreeing, s.met, static_cast<double>(s.on) / static_cast<double>(n)});
   return array(std::move(shares), {b, 3});
+}
+
+Array<double> array_of(const Square<6>& A) {
+  std::vector<double> flat;
+  for (const Twist& row : A) flat.insert(flat.end(), row.begin(), row.end());
+  return array(std::move(flat), {6, 6});
 }
 
 // One pose, whose pseudo points are moved already and whose planes are known. The scale of the residuals is their own:
@@ -144,9 +151,14 @@ nb::tuple plane_sums(Points<double> x, Points<double> own_normals, Points<double
     loss.scale = std::max(3 * 1.4826 * *middle, std::numeric_limits<double>::min());
   }
   std::vector<StepSums> sums(1);
-  for (std::size_t i = 0; i < n; ++i)
-    if (found[i]) sums[0].add(view(x)[i], *found[i], spreads.data()[i], loss);
-  return arrays_of(sums);
+  CertaintySums known;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (!found[i]) continue;
+    sums[0].add(view(x)[i], *found[i], spreads.data()[i], loss);
+    known.add(view(x)[i], view(own_normals)[i], view(means)[i], *found[i], spreads.data()[i], loss);
+  }
+  known.end_run();
+  return nb::make_tuple(arrays_of(sums), array_of(known.hold), array_of(known.scatter));
 }
 
 // Gauss-Newton steps of many poses: the twists (b, 6), and the poses (b, 4, 4) that they lead to.
@@ -173,6 +185,43 @@ auto take_steps(Matrices4 poses, nb::ndarray<const double, nb::shape<-1, 6, 6>, 
     std::copy(x.begin(), x.end(), twists.begin() + static_cast<std::ptrdiff_t>(6 * k));
   }
   return std::make_pair(array(std::move(twists), {b, 6}), array(std::move(moved), {b, 4, 4}));
+}
+
+// For each surfel, how many of the witnesses lie in its plane (n,).
+Array<std::uint32_t> coplanar(Points<double> places, Points<double> normals, Points<double> witness_places,
+                              Points<double> witness_normals, double distance, double min_cosine, int threads) {
+  const std::size_t n = places.shape(0);
+  check_lengths(n, {normals.shape(0)});
+  check_lengths(witness_places.shape(0), {witness_normals.shape(0)});
+  std::vector<std::uint32_t> counts(n);
+  {
+    nb::gil_scoped_release free;
+    Witnesses witnesses;
+    for (std::size_t k = 0; k < witness_places.shape(0); ++k) witnesses.add(view(witness_places)[k], view(witness_normals)[k]);
+    const float near = static_cast<float>(distance), cosine = static_cast<float>(min_cosine);
+    parallel_blocks(n, 256, threads, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i)
+        counts[i] = static_cast<std::uint32_t>(witnesses.in_plane(view(places)[i], view(normals)[i], near, cosine));
+    });
+  }
+  return array(std::move(counts), {n});
+}
+
+void construct_sight(Sight* self, Points<double> points, Values eye, int cells) {
+  check_lengths(3, {eye.shape(0)});
+  if (cells < 1) throw std::invalid_argument("there must be cells");
+  nb::gil_scoped_release free;
+  new (self) Sight(view(points), {eye.data()[0], eye.data()[1], eye.data()[2]}, cells);
+}
+
+Array<double> ranges(const Sight& sight, Points<double> places) {
+  std::vector<double> found(places.shape(0));
+  {
+    nb::gil_scoped_release free;
+    for (std::size_t i = 0; i < found.size(); ++i) found[i] = sight.range_towards(view(places)[i]);
+  }
+  const std::size_t n = found.size();
+  return array(std::move(found), {n});
 }
 
 // Poses (c, 4, 4), their scores (c,) and how many were tested.
@@ -219,15 +268,20 @@ void bind_search(nb::module_& m) {
       .def("__init__", &construct_grid, "means"_a, "normals"_a, "cell"_a, "margin"_a)
       .def("robust_sums", &grid_sums, "places"_a, "normals"_a, "offsets"_a, "poses"_a, "scale"_a,
            "min_cosine"_a, "reach"_a, "threads"_a)
-      .def("agreement", &grid_agreement, "places"_a, "normals"_a, "poses"_a, "scale"_a, "min_cosine"_a, "reach"_a,
+      .def("agreement", &grid_agreement, "places"_a, "normals"_a, "weights"_a, "poses"_a, "scale"_a, "min_cosine"_a, "reach"_a,
            "threads"_a);
   nb::class_<PairTable>(m, "PairTable", "Pairs of surfels, found again by what no rigid motion changes.")
       .def("__init__", &construct_table, "means"_a, "normals"_a, "shortest"_a, "longest"_a, "threads"_a)
       .def("__len__", &PairTable::size);
+  nb::class_<Sight>(m, "Sight", "What a sensor saw from where it stood.")
+      .def("__init__", &construct_sight, "points"_a, "eye"_a, "cells"_a)
+      .def("ranges", &ranges, "places"_a);
   m.def("search", &search_poses, "grid"_a, "table"_a, "drawn_means"_a, "drawn_normals"_a, "probe_means"_a,
         "probe_normals"_a, "confinement"_a.none(), "settings"_a, "threads"_a);
   m.def("robust_sums", &plane_sums, "x"_a, "own_normals"_a, "means"_a, "normals"_a, "spreads"_a, "min_cosine"_a,
         "reach"_a);
+  m.def("coplanar", &coplanar, "places"_a, "normals"_a, "witness_places"_a, "witness_normals"_a, "distance"_a,
+        "min_cosine"_a, "threads"_a);
   m.def("take_steps", &take_steps, "poses"_a, "H"_a, "g"_a, "stretch"_a, "largest_turn"_a);
 }
 

@@ -28,4 +28,27 @@ void fit_surfels(const PointTree& tree, PointsView<Real> queries, int k, int thr
   });
 }
 
+// How many of the witnesses, some planes (n, 3) of a surface, lie in the plane through a place: within `distance` of it,
+// and their normals within an angle of this cosine.
+struct Witnesses {
+  std::vector<float> x, y, z, nx, ny, nz;  // by coordinate, so that several are asked at a time
+
+  void add(Vec3 mean, Vec3 normal) {
+    const auto put = [](std::vector<float>& list, double value) { list.push_back(static_cast<float>(value)); };
+    put(x, mean.x), put(y, mean.y), put(z, mean.z);
+    put(nx, normal.x), put(ny, normal.y), put(nz, normal.z);
+  }
+  int in_plane(Vec3 mean, Vec3 normal, float distance, float min_cosine) const {
+    const float a = static_cast<float>(normal.x), b = static_cast<float>(normal.y), c = static_cast<float>(normal.z);
+    const float offset = static_cast<float>(dot(mean, normal));
+    int count = 0;
+    for (std::size_t j = 0; j < x.size(); ++j) {
+      const float away = std::abs(a * x[j] + b * y[j] + c * z[j] - offset);
+      const float cosine = std::abs(a * nx[j] + b * ny[j] + c * nz[j]);
+      count += static_cast<int>(away < distance) & static_cast<int>(cosine > min_cosine);
+    }
+    return count;
+  }
+};
+
 }  // namespace fieldalign

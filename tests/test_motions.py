@@ -3,7 +3,17 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from fieldalign.errors import ArgumentError
-from fieldalign.motions import adjoint, apply, as_rigid, exp_twist, inverse, nearest_rotation, rotate, translation
+from fieldalign.motions import (
+    adjoint,
+    apply,
+    as_rigid,
+    exp_twist,
+    inverse,
+    log_motion,
+    nearest_rotation,
+    rotate,
+    translation,
+)
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-7, 9.9e-5, 1.01e-4, 1e-2, 1.0, 3.1, np.pi, 5.0])
@@ -11,6 +21,37 @@ def test_exp_agrees_with_scipy(rng, angle):
     w = rng.normal(size=3)
     twist = np.r_[angle * w / np.linalg.norm(w), rng.normal(size=3)]
     assert np.allclose(exp_twist(twist), RigidTransform.from_exp_coords(twist).as_matrix(), atol=4e-15, rtol=0)
+
+
+ANGLES = [0.0, 1e-12, 1e-9, 1e-7, 9.9e-5, 1.01e-4, 1e-2, 1.0, 2.6, 2.8, 3.1, np.pi - 1e-6, np.pi - 1e-9]
+
+
+@pytest.mark.parametrize("angle", ANGLES)
+def test_log_agrees_with_scipy_and_undoes_exp(rng, angle):
+    for _ in range(10):
+        w, v = rng.normal(size=(2, 3))
+        T = RigidTransform.from_exp_coords(np.r_[angle * w / np.linalg.norm(w), v])
+        found = log_motion(T.as_matrix())
+        assert np.allclose(found[:3], T.rotation.as_rotvec(), atol=1e-8 if angle > 3.1 else 1e-13, rtol=0)
+        assert np.allclose(found, T.as_exp_coords(), atol=1e-7 if angle > 3.1 else 1e-12, rtol=0)
+        assert np.allclose(exp_twist(found), T.as_matrix(), atol=1e-8 if angle > 3.1 else 1e-13, rtol=0)
+
+
+@pytest.mark.parametrize("axis", [*np.eye(3), [1, 1, 0], [-1, 2, 3], [0, -1, 1], [1, 1, 1]], ids=str)
+@pytest.mark.parametrize("past", [0.0, 1e-9, -1e-9])
+def test_log_of_half_a_turn_is_half_a_turn(rng, axis, past):
+    """About either end of the axis: both are logarithms. Just past half a turn it is the shorter way round."""
+    T = exp_twist(np.r_[(np.pi + past) * np.array(axis) / np.linalg.norm(axis), rng.normal(size=3)])
+    found = log_motion(T)
+    assert np.linalg.norm(found[:3]) == pytest.approx(np.pi, abs=2e-9)
+    assert np.linalg.norm(found[:3]) <= np.pi + 1e-15
+    assert np.linalg.norm(np.cross(found[:3], axis)) < 1e-7
+    assert np.allclose(exp_twist(found), T, atol=1e-8, rtol=0)
+
+
+def test_log_carries_over_to_other_frames_as_adjoints_say(rng):
+    T, x = exp_twist(rng.normal(size=6)), 0.7 * rng.normal(size=6)
+    assert np.allclose(log_motion(T @ exp_twist(x) @ inverse(T)), adjoint(T) @ x, atol=1e-12)
 
 
 def test_inverse_undoes(rng):

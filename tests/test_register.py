@@ -20,7 +20,7 @@ def found(request, corner):
     return fa.register(corner[:4000], apply(T, corner[2000:]), method=request.param)
 
 
-# ----------------------------------------------------------------------------------------------------- the first guess
+# ---------------------------------------------------------------------------------------------------- the first guess
 
 
 def test_a_guess_may_be_a_list_or_have_few_digits(register, pair):
@@ -238,7 +238,7 @@ def test_the_seed_and_nothing_else_decides(register, corner, pair):
     assert not np.array_equal(other.history[0].increment, one.history[0].increment)
 
 
-# ---------------------------------------------------------------------------------------------------------- the answer
+# --------------------------------------------------------------------------------------------------------- the answer
 
 def test_the_result_has_its_shapes(found):
     k = found.unobservable.shape[1]
@@ -284,7 +284,9 @@ def test_the_dictionary_holds_the_whole_result(found):
     for name in ("accepted", "overlap", "overlap_target", "iterations", "rmse", "seconds"):
         assert plain[name] == getattr(found, name)
     assert plain["reason"] == "accepted"
-    assert plain["message"] == str(found.reason)
+    assert plain["message"] == found.verdict
+    assert plain["evidence"] == (None if found.evidence is None else found.evidence.to_dict())
+    assert plain["freedoms"] == []
     assert plain["dropped"] == {"source": 0, "target": 0}
     assert [step["kept"] for step in plain["history"]] == [step.kept for step in found.history]
     assert plain["alternatives"] == []
@@ -298,7 +300,9 @@ def test_alternatives_are_in_the_dictionary_too(found):
 @pytest.mark.parametrize("reason", fa.Reason)
 def test_a_reason_is_a_sentence(reason):
     assert str(reason).endswith(".")
-    assert str(reason).startswith("Accepted:" if reason is fa.Reason.ACCEPTED else "Not accepted:")
+    begins = {fa.Reason.ACCEPTED: "Accepted:", fa.Reason.ACCEPTED_NEAR_INIT: "Accepted near the guess:"}
+    assert str(reason).startswith(begins.get(reason, "Not accepted:"))
+    assert reason.accepts is (reason in begins)
     assert len(str(reason).split()) > 5
 
 

@@ -163,3 +163,30 @@ def test_one_of_the_main_axes_is_the_way_back(rng, any_motion):
         turned = rotate(G[:3, :3], np.eye(3)) - rotate(inverse(T)[:3, :3], np.eye(3))
         best = min(best, np.abs(turned).max())
     assert best < 0.05
+
+
+# ------------------------------------------------------------------------------------------------------------ weights
+
+
+def test_all_surfels_of_one_plane_count_alike(rng):
+    sheet = Surface(np.c_[rng.uniform(0, 4, (20_000, 2)), np.zeros(20_000)], VOXEL, 1)
+    assert np.allclose(sheet.weights, 1 / len(sheet))
+
+
+def test_a_surfel_counts_less_where_more_of_the_surface_lies_in_its_plane(rng):
+    """A large floor, a small wall, and a ball, of which hardly anything lies in one plane."""
+    floor = np.c_[rng.uniform(0, 6, (36_000, 2)), np.zeros(36_000)]
+    wall = np.c_[np.zeros(4_000), rng.uniform(0, 2, (4_000, 2))] + [0, 0, 0.5]
+    surface = Surface(np.vstack([floor, wall, ball(3_000, rng, 0.5) + [3, 3, 1.5]]), VOXEL, 1)
+    places = surface.places + surface.origin
+    on_floor, on_wall = places[:, 2] < 0.1, np.abs(places[:, 0]) < 0.05
+    of_floor, of_wall, of_ball = (surface.weights[rows].mean() for rows in (on_floor, on_wall, ~(on_floor | on_wall)))
+    assert of_floor < of_wall < of_ball
+    assert surface.weights.sum() == pytest.approx(1)
+    assert surface.weights.min() > 0
+
+
+def test_the_weights_have_the_same_bits_at_any_number_of_threads(room):
+    one = Surface(room, VOXEL, 1).weights
+    for threads in (2, 8):
+        assert np.array_equal(Surface(room, VOXEL, threads).weights, one)

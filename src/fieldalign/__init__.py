@@ -9,16 +9,20 @@ from .clouds.thinning import thin
 from .errors import ArgumentError, CloudFileError, FieldalignError, FieldError, MissingExtraError
 from .prepared import PreparedCloud, prepare
 from .register import register
-from .result import Reason, RegistrationResult
+from .result import RegistrationResult
 from .settings import PRESETS, Settings
+from .verdict import Evidence, Freedom, Reason
+from .verify import verify
 
 __version__ = "0.1.0"
 __all__ = [
     "PRESETS",
     "ArgumentError",
     "CloudFileError",
+    "Evidence",
     "FieldError",
     "FieldalignError",
+    "Freedom",
     "MissingExtraError",
     "PointCloud",
     "PreparedCloud",
@@ -31,6 +35,7 @@ __all__ = [
     "read_clouds",
     "register",
     "thin",
+    "verify",
     "write_cloud",
 ]
 

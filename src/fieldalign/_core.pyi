@@ -95,13 +95,22 @@ class ClosestGrid:
         self,
         places: Floats,
         normals: Floats,
+        weights: Floats,
         poses: Floats,
         scale: float,
         min_cosine: float,
         reach: float,
         threads: int,
     ) -> Floats:
-        """For each pose the shares of surfels (n, 3) that agree (weighted), are on the surface, are near it (b, 3)."""
+        """For each pose (b, 3): the weights (n,) of the surfels that agree with the surface, and of those near it,
+        added up, and the share of all that lie on it."""
+
+class Sight:
+    """What a sensor at `eye` (3,) saw, points (N, 3), by directions: `cells` squared on each face of a cube."""
+
+    def __init__(self, points: Floats, eye: Floats, cells: int) -> None: ...
+    def ranges(self, places: Floats) -> Floats:
+        """How far the sensor looked freely in the direction of each place (n, 3); NaN where it saw nothing (n,)."""
 
 class PairTable:
     """Pairs of surfels at distances from `shortest` to `longest`, found again by what no rigid motion changes."""
@@ -125,9 +134,22 @@ def search(
 
 def robust_sums(
     x: Floats, own_normals: Floats, means: Floats, normals: Floats, spreads: Floats, min_cosine: float, reach: float
-) -> tuple[Floats, Floats, Floats]:
+) -> tuple[tuple[Floats, Floats, Floats], Floats, Floats]:
     """As ClosestGrid.robust_sums, of one pose: pseudo points x (n, 3), moved already, their planes (n, 3), and how
-    widely each residual spreads (n,). The scale is three standard deviations of the residuals themselves."""
+    widely each residual spreads (n,). The scale is three standard deviations of the residuals themselves. Then what
+    holds the pose (6, 6), free of the normals' noise, and the scatter (6, 6) of the gradient."""
+
+def coplanar(
+    places: Floats,
+    normals: Floats,
+    witness_places: Floats,
+    witness_normals: Floats,
+    distance: float,
+    min_cosine: float,
+    threads: int,
+) -> NDArray[uint32]:
+    """For each surfel (n, 3), how many of the witnesses (m, 3) lie within `distance` of its plane, their normals within
+    an angle of this cosine (n,)."""
 
 def take_steps(poses: Floats, H: Floats, g: Floats, stretch: Floats, largest_turn: float) -> tuple[Floats, Floats]:
     """Twists -stretch H^+ g (b, 6), turning by at most largest_turn, and the poses (b, 4, 4) that they lead to."""

@@ -23,6 +23,7 @@ from .scale import Scale, scale_of, within
 from .settings import Settings
 from .surface import Surface
 from .threads import resolve_threads
+from .verdict.sight import Sight
 
 _KEPT = 8  # pseudo sets that a prepared cloud remembers
 _FINE = 50_000  # points: more are thinned before the last level of an alignment
@@ -36,12 +37,15 @@ class PreparedCloud:
     """A cloud with its distance field, and the pseudo points and their features that were asked of it so far.
 
     field: its DistanceField. centre: (3,), mean of the points, or middle of the bounds. extent: diagonal of the bounds.
-    dropped: how many NaN rows were left out.
+    dropped: how many NaN rows were left out. eye: (3,), where the sensor stood, in the cloud's frame, or None.
     """
 
-    def __init__(self, field: DistanceField, dropped: int = 0, threads: int | None = None) -> None:
+    def __init__(
+        self, field: DistanceField, dropped: int = 0, threads: int | None = None, eye: Floats | None = None
+    ) -> None:
         self.field = field
         self.dropped = dropped
+        self.eye = eye
         self._threads = resolve_threads(threads)
         self._features: dict[Hashable, tuple[Floats, FieldSample]] = {}
         self._surfaces: dict[int, Surface] = {}
@@ -110,6 +114,11 @@ class PreparedCloud:
     def exact(self) -> DistanceField:
         """What the last level of an alignment asks: the fine points, or the field itself where it is no cloud."""
         return self.fine if isinstance(self.field, PointField) else self.field
+
+    @lazy
+    def sight(self) -> Sight | None:
+        """How far the sensor saw in each direction, where it is known where it stood."""
+        return None if self.eye is None else Sight(np.asarray(self.fine.points, float), self.eye)
 
     def pseudo_planes(self, neighbours: int) -> Planes:
         """Pseudo points of the last level: places spread over the surface, and the planes there."""
@@ -180,16 +189,20 @@ def prepare_named(cloud: CloudLike, name: str, threads: int | None, drop_nonfini
         return cloud
     if isinstance(cloud, DistanceField):
         return PreparedCloud(cloud, threads=threads)
-    checked = checked_points(_points_of(cloud), name, resolve_threads(threads), drop_nonfinite)
-    return PreparedCloud(PointField(checked, threads=threads), checked.dropped, threads)
+    points, eye = _parts_of(cloud)
+    checked = checked_points(points, name, resolve_threads(threads), drop_nonfinite)
+    return PreparedCloud(PointField(checked, threads=threads), checked.dropped, threads, eye)
 
 
-def _points_of(cloud: Any) -> Any:
+def _parts_of(cloud: Any) -> tuple[Any, Floats | None]:
+    """The points, and the place (3,) of the sensor where the cloud knows it."""
     if isinstance(cloud, str | Path | os.PathLike):
         from .clouds.files import read_cloud  # the libraries behind it load only where a file is read
 
         cloud = read_cloud(cloud)
-    return cloud.points if isinstance(cloud, PointCloud) else cloud
+    if not isinstance(cloud, PointCloud):
+        return cloud, None
+    return cloud.points, None if cloud.viewpoint is None else np.ascontiguousarray(cloud.viewpoint[:3, 3])
 
 
 def _moments(cloud: PointField) -> Floats:

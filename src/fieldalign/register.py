@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike
 from .arguments import as_count, check_one_of, check_positive
 from .clock import Clock
 from .errors import ArgumentError
-from .methods import register_by_paper, register_robust
-from .methods.robust import Start
+from .methods import Start, register_by_paper, register_robust
 from .motions import as_rigid
 from .prepared import CloudLike, prepare_pair
 from .result import RegistrationResult

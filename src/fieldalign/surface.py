@@ -19,14 +19,17 @@ _FAR = 500.0           # voxels from the middle: what lies further is left out, 
 _PLANAR = 0.05, 3.0    # voxels, along a surfel's shorter axis: neither a line nor scattered points
 _SPARSE = 3.0          # voxels between the surfels that pairs are made of
 _MEMBERS = 1000        # of them at most
+_WITNESSES = 256       # surfels that stand for all where planes are counted
+_COPLANAR = 2.0, 0.9   # voxels from a plane, cosine between normals, of surfels that lie in it
+_LEAST_FLAT = 0.02     # of a surfel as thick as it is wide
 _PAIR_BAND = 6.0, 45.0  # voxels between the two surfels of a pair
 
 
 class Surface:
     """Surfels, about one for each occupied voxel.
 
-    places, normals: (n, 3), about `origin`; a normal's sign means nothing. voxel: the edge, in the cloud's unit.
-    origin: (3,), a place in the cloud's frame.
+    places, normals: (n, 3), about `origin`; a normal's sign means nothing. flatness: (n,), 0 to 1.
+    voxel: the edge, in the cloud's unit. origin: (3,), a place in the cloud's frame.
     """
 
     def __init__(self, points: NDArray[Any], voxel: float, threads: int) -> None:
@@ -48,6 +51,7 @@ class Surface:
         thinnest, widest = _PLANAR
         planar = (width > thinnest * voxel) & (width < widest * voxel)
         self.places, self.normals = _where(planar, places), _where(planar, normals)
+        self.flatness = np.clip(1 - _where(planar, thickness / np.maximum(width, 1e-300)) ** 2, _LEAST_FLAT, 1)
 
     def __len__(self) -> int:
         return len(self.places)
@@ -67,6 +71,18 @@ class Surface:
             if len(rows) <= _MEMBERS:
                 return rows
             edge *= 1.05 * float(np.sqrt(len(rows) / _MEMBERS))
+
+    @lazy
+    def weights(self) -> Floats:
+        """What each surfel counts for (n,), 1 in all: less where more of the surface lies in its plane, since a wall
+        agrees with any other wall, and less where it is no plane but a clump of scattered points."""
+        rows = np.random.default_rng(0).integers(0, len(self), _WITNESSES)
+        near, cosine = _COPLANAR
+        company = _core.coplanar(
+            self.places, self.normals, self.places[rows], self.normals[rows], near * self.voxel, cosine, self._threads
+        )
+        weights = self.flatness / (1.0 + company)
+        return np.asarray(weights / weights.sum())
 
     @lazy
     def coarse_grid(self) -> _core.ClosestGrid:

@@ -8,7 +8,8 @@ import pytest
 from scipy.spatial import cKDTree
 
 from fieldalign.alignment import descend
-from fieldalign.alignment.robust import LEVELS, FieldStage, GridStage, agreement, anneal
+from fieldalign.alignment.agreement import mutual_score
+from fieldalign.alignment.robust import LEVELS, FieldStage, GridStage, anneal
 from fieldalign.clouds.simulated import simulate_pair
 from fieldalign.evaluation import rotation_error, translation_error
 from fieldalign.fields import PointField
@@ -40,7 +41,7 @@ def degrees_off(poses, G):
     return np.array([rotation_error(pose, G) for pose in poses])
 
 
-# ------------------------------------------------------------------------------------------------------- coarse levels
+# ------------------------------------------------------------------------------------------------------ coarse levels
 
 
 @pytest.mark.parametrize(("level", "degrees", "shift"), [(0, 12, 0.3), (1, 2, 0.1), (2, 1, 0.04)])
@@ -84,7 +85,7 @@ def test_annealing_finds_the_right_one_among_wrong_poses(rng):
     assert translation_error(poses[0], G) < 0.05
     assert (np.diff(scores) <= 0).all()
     assert len(poses) <= LEVELS[-1].keep
-    assert np.array_equal(scores, agreement(held, moving, poses, 2).score)
+    assert np.array_equal(scores, mutual_score(held, moving, poses, 2))
 
 
 def test_poses_that_come_to_one_place_are_one(rng):
@@ -103,64 +104,6 @@ def test_annealing_has_the_same_bits_at_any_number_of_threads(rng):
         again = anneal(held, moving, start, 0, threads)
         assert np.array_equal(again[0], one[0])
         assert np.array_equal(again[1], one[1])
-
-
-# ---------------------------------------------------------------------------------------------------------- agreement
-
-
-def test_a_surface_agrees_with_itself():
-    held, *_ = room()
-    itself = agreement(held, held, np.eye(4)[None], 1)
-    assert itself.met[0] == 1
-    assert itself.on[0] > 0.97
-    assert 0.85 < itself.agreeing[0] <= 1
-    assert itself.score[0] == pytest.approx(itself.agreeing[0] ** 2)
-
-
-def test_shares_are_shares_and_ordered(rng):
-    held, moving, _, _, G = room()
-    poses = np.concatenate([near(G, rng, angle, shift, 5) for angle, shift in ((0.1, 0), (5, 0.1), (90, 1), (9, 50))])
-    found = agreement(held, moving, poses, 2)
-    for shares in (found.agreeing, found.on, found.met, found.purity, found.score):
-        assert shares.shape == (20,)
-        assert (shares >= 0).all()
-        assert (shares <= 1).all()
-    assert (found.on <= found.met).all()
-    assert (found.agreeing <= found.met).all()
-    assert found.score[:5].min() > 2 * found.score[5:].max()
-    assert not found.met[15:].any()
-    assert not found.score[15:].any()  # and no division by nothing
-    assert np.array_equal(found.of(3).agreeing, found.agreeing[3:4])
-
-
-def test_a_detail_is_wholly_on_the_whole_and_not_the_reverse():
-    held, *_ = room()
-    points = simulate_pair(3, 20_000).source.points
-    part = Surface(points[np.linalg.norm(points - points[0], axis=1) < 1.5], VOXEL, 1)
-    G = translation(part.origin - held.origin)
-    assert agreement(held, part, G[None], 1).on[0] > 0.95
-    share = len(part) / len(held)
-    assert agreement(part, held, inverse(G)[None], 1).on[0] == pytest.approx(share, abs=0.3 * share)
-
-
-def test_some_rows_stand_for_all(rng):
-    held, moving, _, _, G = room()
-    all_of_them = agreement(held, moving, G[None], 1)
-    some = agreement(held, moving, G[None], 1, rng.integers(0, len(moving), 2000))
-    assert some.agreeing[0] == pytest.approx(all_of_them.agreeing[0], abs=0.05)
-
-
-def test_a_shifted_sheet_agrees_less_and_less():
-    """A plane on a plane, raised: on it up to a voxel, met further up, and its weight is Geman and McClure's."""
-    u, v = np.meshgrid(np.arange(0, 4, 0.02), np.arange(0, 4, 0.02))
-    sheet = Surface(np.c_[u.ravel(), v.ravel(), 0 * u.ravel()], 0.2, 1)
-    heights = np.array([0.0, 0.05, 0.15, 0.25, 0.45, 2.0])
-    poses = np.stack([translation([0, 0, height]) for height in heights])
-    found = agreement(sheet, sheet, poses, 1)
-    assert np.allclose(found.agreeing[:4], 1 / (1 + (heights[:4] / 0.2) ** 2) ** 2, atol=0.01)
-    assert np.allclose(found.on, heights < 0.2, atol=0.05)
-    assert np.allclose(found.met[:5], 1)
-    assert found.met[5] == 0
 
 
 # --------------------------------------------------------------------------------------------------------- last level

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import fieldalign as fa
-from fieldalign.cli import VERBS, main
+from fieldalign.cli import VERBS
 from fieldalign.evaluation import rotation_error
 from fieldalign.motions import apply
 
@@ -31,24 +31,6 @@ def scans(corner, tmp_path_factory):
     return folder, T
 
 
-@pytest.fixture
-def call(scans, monkeypatch, capsys):
-    """Runs a command in the folder of the scans: exit status, stdout, stderr; what it leaves there is removed."""
-    folder, _ = scans
-    monkeypatch.chdir(folder)
-    before = set(folder.rglob("*"))
-
-    def run(*args):
-        with pytest.raises(SystemExit) as ended:
-            main([str(arg) for arg in args])
-        out, err = capsys.readouterr()
-        return ended.value.code, out, err
-
-    yield run
-    for left in set(folder.rglob("*")) - before:
-        left.unlink()
-
-
 PAPER = ("--method", "paper")
 
 
@@ -63,7 +45,7 @@ def is_one_error(status, out, err):
     return status == 1 and out == "" and len(lines) == 1 and lines[0].startswith("Error: ")
 
 
-# ----------------------------------------------------------------------------------------------------------- answering
+# ---------------------------------------------------------------------------------------------------------- answering
 
 
 def test_an_accepted_pose_is_printed(call, scans):
@@ -159,7 +141,7 @@ def test_millimetres_give_the_same_motion(call, scans, corner, options):
     assert np.allclose(found[:3, 3], 1000 * T[:3, 3], atol=1e-5)
 
 
-# ------------------------------------------------------------------------------------------------------ the first guess
+# ---------------------------------------------------------------------------------------------------- the first guess
 
 
 def write_guess(name, T):
@@ -228,7 +210,7 @@ def test_a_guess_that_is_no_pose_is_one_error(call, text):
     assert "init must" in answer[2]
 
 
-# -------------------------------------------------------------------------------------------------------------- errors
+# ------------------------------------------------------------------------------------------------------------- errors
 
 
 @pytest.mark.parametrize(
@@ -312,7 +294,7 @@ def test_an_unknown_verb_is_one_error(call):
     assert "regster" in answer[2]
 
 
-# ---------------------------------------------------------------------------------------------------------------- help
+# --------------------------------------------------------------------------------------------------------------- help
 
 
 @pytest.mark.parametrize("flag", ["--help", "-h"])

@@ -23,7 +23,8 @@ def bits(result: fa.RegistrationResult) -> list[bytes]:
     numbers = np.array([result.overlap, result.overlap_target, result.rmse, result.iterations])
     steps = [step.increment for step in result.history]
     others = [part for other in result.alternatives for part in bits(other)]
-    return [array.tobytes() for array in (*arrays, numbers, *steps)] + others
+    verdict = result.verdict.encode(), repr(result.evidence).encode(), result.covariance.tobytes()
+    return [array.tobytes() for array in (*arrays, numbers, *steps)] + [*verdict, *others]
 
 
 @pytest.mark.parametrize("options", METHODS.values(), ids=METHODS)

@@ -75,9 +75,12 @@ def test_a_denser_scan_is_hardly_slower_and_more_exact():
 
 @pytest.mark.parametrize("side", ["source", "target"])
 def test_one_point_in_twenty(scans, side):
+    """A thousand points are found, though they are too few to be sure of it."""
     sparse = {"source": scans.source, "target": scans.target}
     sparse[side] = sparse[side][::20]
-    assert is_right(fa.register(**sparse), scans.truth, 0.5, 0.03)
+    T = fa.register(**sparse).T_target_source
+    assert rotation_error(T, scans.truth) < 0.5
+    assert translation_error(T, scans.truth) < 0.03
 
 
 @pytest.mark.parametrize("scene", [3, 4, 9])
@@ -257,7 +260,7 @@ def test_one_odd_thing_settles_it(any_motion, rng):
     assert rotation_error(result.T_target_source, T) < 0.5
 
 
-# ------------------------------------------------------------------------------------------------- what slides or turns
+# ----------------------------------------------------------------------------------------------- what slides or turns
 
 
 def ball(n, rng):
@@ -314,7 +317,7 @@ def test_a_tube_turns_and_slides_about_its_axis(any_motion, rng):
     assert np.linalg.norm(turn[:2, 3]) < 0.02
 
 
-# ------------------------------------------------------------------------------------------------------ hopeless pairs
+# ----------------------------------------------------------------------------------------------------- hopeless pairs
 
 
 @pytest.mark.parametrize("n", [3, 4, 5, 10, 50, 200])
@@ -332,6 +335,16 @@ def test_tiny_clouds_are_answered(any_motion, n, seed):
         assert 0 <= result.overlap <= 1
         assert not result.accepted or np.abs(result.T_target_source - T).max() < 1e-6
         json.dumps(result.to_dict(), allow_nan=False)
+
+
+@pytest.mark.parametrize(("seed", "n", "init"), [(176, 3, None), (278, 3, None), (94, 50, np.eye(4)),
+                                                (144, 50, np.eye(4)), (0, 50, None)])
+def test_tiny_clouds_that_lie_on_each_other_are_answered(seed, n, init):
+    """Seeds for which most residuals are zero to the last bit, and others are not."""
+    few = np.random.default_rng(seed).random((n, 3))
+    result = fa.register(few, few, init=init)
+    assert np.isfinite(result.T_target_source).all()
+    json.dumps(result.to_dict(), allow_nan=False)
 
 
 @pytest.mark.parametrize("n", [3, 10, 50])
@@ -426,7 +439,7 @@ def test_two_formulas():
     assert translation_error(result.T_target_source, np.eye(4)) < 0.001
 
 
-# ----------------------------------------------------------------------------------------------------------- the answer
+# --------------------------------------------------------------------------------------------------------- the answer
 
 
 def test_the_stages_are_told(scans):
@@ -451,7 +464,8 @@ def test_information_is_that_of_a_left_perturbation_about_the_reference_point(sc
 
 @pytest.mark.parametrize("detail", [False, True])
 def test_information_turns_with_the_targets_frame_and_not_with_the_sources(scans, any_motion, detail):
-    """Whichever cloud is held; other frames have other voxels, so to a third or so."""
+    """Whichever cloud is held; other frames have other voxels and other runs of neighbours, of which some hundred tell
+    the scatter: so to a half or so."""
     source = scans.source[furniture_around(scans.source, 1.5)] if detail else scans.source
     W = any_motion(np.random.default_rng(8), 5.0)
     plain = fa.register(source, scans.target, init=scans.truth)
@@ -462,7 +476,7 @@ def test_information_turns_with_the_targets_frame_and_not_with_the_sources(scans
     for got, expected in ((turned.information, block @ plain.information @ block.T),
                           (other.information, plain.information)):
         back = block.T if got is turned.information else np.eye(6)
-        assert np.abs(back @ (got - expected) @ back.T / size).max() < 0.35
+        assert np.abs(back @ (got - expected) @ back.T / size).max() < 0.5
     assert np.linalg.norm(apply(W, plain.reference_point[None])[0] - turned.reference_point) < 0.1
     assert np.linalg.norm(plain.reference_point - other.reference_point) < 0.1
     assert np.abs(block @ plain.information @ block.T - plain.information).max() > 0.5 * size.max()
@@ -480,7 +494,7 @@ def test_the_overlap_is_of_each_cloud(scans):
     assert result.overlap_target == pytest.approx(back, abs=0.25)
 
 
-# --------------------------------------------------------------------------------------------------------- what is kept
+# ------------------------------------------------------------------------------------------------------- what is kept
 
 
 def test_what_is_prepared_is_not_made_again(scans, monkeypatch):

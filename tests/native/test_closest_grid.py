@@ -139,7 +139,9 @@ def test_a_grid_of_nothing_and_arrays_of_other_lengths_are_refused():
         with pytest.raises(ValueError, match="length"):
             grid.robust_sums(np.eye(3), np.eye(3)[:normals], np.zeros(offsets), np.eye(4)[None], 1, 0, 1, 1)
     with pytest.raises(ValueError, match="length"):
-        grid.agreement(np.eye(3), np.eye(3)[:2], np.eye(4)[None], 1, 0, 1, 1)
+        grid.agreement(np.eye(3), np.eye(3)[:2], np.ones(3), np.eye(4)[None], 1, 0, 1, 1)
+    with pytest.raises(ValueError, match="length"):
+        grid.agreement(np.eye(3), np.eye(3), np.ones(2), np.eye(4)[None], 1, 0, 1, 1)
 
 
 # --------------------------------------------------------------------------------------------------------------- sums
@@ -192,7 +194,7 @@ def test_the_sums_over_known_planes_are_those_of_the_grid(scene):
     partners = cKDTree(means).query(x[known] - offsets[known])[1]
     narrow = [np.ascontiguousarray(a[partners].astype(np.float32).astype(float)) for a in (means, normals)]
     own = rotate(poses[0][:3, :3], normals[rows])
-    H, g, totals = _core.robust_sums(x[known], own[known], *narrow, np.ones(known.sum()), 0.8, 0.5)
+    (H, g, totals), _, _ = _core.robust_sums(x[known], own[known], *narrow, np.ones(known.sum()), 0.8, 0.5)
     assert totals[0, 3] > 300
     between = own[known] + narrow[1] * np.sign((own[known] * narrow[1]).sum(axis=1))[:, None]
     between /= np.linalg.norm(between, axis=1)[:, None]
@@ -211,11 +213,13 @@ def test_residuals_that_spread_more_count_less(scene):
     _, means, normals, rows, offsets, _ = scene
     x = means[rows] + 0.02 * offsets[:, None]
     planes = means[rows], normals[rows]
-    H, g, totals = _core.robust_sums(x, normals[rows], *planes, np.ones(500), 0.8, 0.5)
-    wide = _core.robust_sums(x, normals[rows], *planes, np.full(500, 2.0), 0.8, 0.5)
+    (H, g, totals), hold, scatter = _core.robust_sums(x, normals[rows], *planes, np.ones(500), 0.8, 0.5)
+    wide, wide_hold, wide_scatter = _core.robust_sums(x, normals[rows], *planes, np.full(500, 2.0), 0.8, 0.5)
     assert np.allclose(wide[0], H / 4)
     assert np.allclose(wide[1], g / 4)
     assert np.allclose(wide[2], totals / [4, 4, 4, 1])
+    assert np.allclose(wide_hold, hold / 4)
+    assert np.allclose(wide_scatter, scatter / 16)
 
 
 def test_nothing_near_is_nothing_summed(scene):
@@ -224,9 +228,10 @@ def test_nothing_near_is_nothing_summed(scene):
     away[:, 0, 3] = 1e4
     for sums in grid.robust_sums(means[rows], normals[rows], offsets, away, 0.1, 0.8, 0.5, 1):
         assert not sums.any()
-    assert not grid.agreement(means[rows], normals[rows], away, 0.1, 0.8, 0.5, 1).any()
-    for sums in _core.robust_sums(means + 9, normals, means, normals, np.ones(2000), 0.8, 0.5):
-        assert not sums.any()
+    assert not grid.agreement(means[rows], normals[rows], np.ones(500), away, 0.1, 0.8, 0.5, 1).any()
+    sums, hold, scatter = _core.robust_sums(means + 9, normals, means, normals, np.ones(2000), 0.8, 0.5)
+    for matrix in (*sums, hold, scatter):
+        assert not matrix.any()
 
 
 # -------------------------------------------------------------------------------------------------------------- steps

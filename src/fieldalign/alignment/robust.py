@@ -9,16 +9,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import _core
 from ..fields.protocol import DistanceField, Floats, Planes, planes_near
-from ..motions import apply, reach_of, rotate
+from ..motions import apply, exp_twist, reach_of, rotate
 from ..surface import Surface
+from .agreement import MIN_COSINE, Apart, agreement, best_distinct, mutual_score
 from .residual import row_dot
 from .solver import Step, descend
 
-MIN_COSINE = 0.8      # between normals that agree
 LARGEST_TURN = 0.3    # rad, of a step
 
 
@@ -37,7 +36,9 @@ LEVELS = (Level(2.0, 240, 5, 24), Level(1.0, 300, 4, 12), Level(0.4, 700, 4, 8))
 _LEAST_SPREAD = 0.1   # of the typical variance: no plane is taken for more exact
 _SHARPEST = 0.3       # voxels: no coarse level weighs residuals by less
 _SCORED = 600         # surfels that a pruning goes by
-_SAME_COSINE, _SAME = 0.9986, 1.0  # 3 degrees and a voxel: poses that came to the same place
+_LEAST_BEND = 0.6     # of the weights: a step is never so long that it ends as far beyond the end
+_SAME = Apart(0.9986, 1.0)  # 3 degrees and a voxel: poses that came to the same place
+_RUN, _FEW = 16, 30    # pseudo points in a run (cpp/linearise.hpp); runs that are too few to tell a scatter
 
 
 class GridStage:
@@ -67,56 +68,15 @@ class GridStage:
 def anneal(held: Surface, moving: Surface, poses: Floats, seed: int, threads: int) -> tuple[Floats, Floats]:
     """The best few of many poses (B, 4, 4), refined level by level, best first, and their scores."""
     rng = np.random.default_rng(seed)
+    middle = moving.places.mean(axis=0)
     for level in LEVELS:
         poses, _ = descend(GridStage(held, moving, level, rng, threads), poses)
         if len(poses) > 1:
             found = agreement(held, moving, poses, threads, rng.integers(0, len(moving), _SCORED)).score
-            poses = poses[_best_distinct(poses, found, moving, level.keep)]
-    found = agreement(held, moving, poses, threads).score
+            poses = poses[best_distinct(poses, found, middle, _SAME, moving.voxel, level.keep)]
+    found = mutual_score(held, moving, poses, threads)
     order = np.argsort(-found, kind="stable")
     return poses[order], found[order]
-
-
-@dataclass(frozen=True, eq=False)
-class Agreement:
-    """How the moving surfels lie on the held surface, for each pose (B,), as shares of all of them.
-
-    agreeing: weighted by how well they agree, normals included. on: within a voxel of the other surface. met: near it
-    at all, agreeing or not.
-    """
-
-    agreeing: Floats
-    on: Floats
-    met: Floats
-
-    def of(self, k: int) -> Agreement:
-        """That of one pose."""
-        return Agreement(self.agreeing[k : k + 1], self.on[k : k + 1], self.met[k : k + 1])
-
-    @property
-    def score(self) -> Floats:
-        """0 to 1: the agreeing share, times the agreeing share of those that meet the other surface at all.
-
-        Planes that slide over planes agree widely, but contradict each other widely too.
-        """
-        return self.agreeing * self.purity
-
-    @property
-    def purity(self) -> Floats:
-        """The agreeing share of what meets the other surface, 0 to 1."""
-        return np.asarray(self.agreeing / np.maximum(self.met, 1e-12))
-
-
-def agreement(
-    held: Surface, moving: Surface, poses: Floats, threads: int, rows: NDArray[np.int64] | slice = slice(None)
-) -> Agreement:
-    """The moving surfels, or some rows of them, on the held surface, for poses (B, 4, 4)."""
-    voxel = max(held.voxel, moving.voxel)
-    places, normals = moving.places[rows], moving.normals[rows]
-    shares = held.coarse_grid.agreement(
-        places, normals, np.ascontiguousarray(poses), voxel, MIN_COSINE, 3 * voxel, threads
-    )
-    return Agreement(*shares.T)
 
 
 class FieldStage:
@@ -132,14 +92,19 @@ class FieldStage:
         extent: float,
         iterations: int,
         patience: float,
+        allowed: Floats | None = None,
     ) -> None:
         """field: the held one, whose place `centre` (3,) is the origin of the poses. planes: the moving cloud's, about
         its own origin. reach: from a pseudo point to its partner, a length. extent: of the cloud, a length. patience:
-        the stage ends with a step that is smaller than so many standard errors."""
+        the stage ends with a step that is smaller than so many standard errors. allowed: basis (6, k) of the twists
+        that steps are made of; None: all."""
         self.field, self.centre, self.planes, self.neighbours = field, centre, planes, neighbours
         self.reach, self.extent, self.iterations, self.patience = reach, extent, iterations, patience
+        self.allowed = allowed
         self.partners: Planes | None = None
         self.H: Floats = np.zeros((6, 6))
+        self.hold: Floats = np.zeros((6, 6))
+        self.scatter: Floats = np.zeros((6, 6))
         self.totals: Floats = np.zeros(4)
         self.twist: Floats = np.zeros(6)
 
@@ -148,7 +113,7 @@ class FieldStage:
         (G,) = poses
         x, normals = apply(G, self.planes.mean), rotate(G[:3, :3], self.planes.normal)
         self.partners = planes_near(self.field, x + self.centre, self.neighbours, self.partners)
-        H, g, totals = _core.robust_sums(
+        (H, g, totals), self.hold, self.scatter = _core.robust_sums(
             x, normals, self.partners.mean - self.centre, self.partners.normal, _spread(self.planes, self.partners),
             MIN_COSINE, self.reach,
         )
@@ -156,7 +121,12 @@ class FieldStage:
         # Far from the end the scale shrinks with the residuals, and a longer step would leap over the end for ever.
         turns_back = g[0] @ self.twist > 0
         stretch = np.ones(1) if turns_back else _stretch(totals)
-        (self.twist,), poses = _core.take_steps(poses, H, g, stretch, LARGEST_TURN)
+        if self.allowed is None:
+            (self.twist,), poses = _core.take_steps(poses, H, g, stretch, LARGEST_TURN)
+        else:
+            within = np.linalg.pinv(self.allowed.T @ H[0] @ self.allowed, hermitian=True)
+            self.twist = -self.allowed @ within @ self.allowed.T @ g[0]
+            poses = (exp_twist(self.twist) @ G)[None]
         return poses, Step(self.twist, self.rmse, int(self.totals[3]))
 
     def overlap(self, G: Floats) -> Floats:
@@ -168,12 +138,24 @@ class FieldStage:
         return np.asarray(x[near].mean(axis=0) if near.any() else x.mean(axis=0))
 
     @property
-    def hold_by_chance(self) -> float:
-        """The share of the best held direction's information that noise in the normals gives to any other."""
+    def curvature(self) -> Floats:
+        """Derivative (6, 6) of the gradient by a twist: H, less what the loss bends."""
+        return np.asarray(self.H / _stretch(self.totals[None]))
+
+    @property
+    def gradient_scatter(self) -> Floats:
+        """Covariance (6, 6) of the gradient: from runs of neighbouring pseudo points, and where these are few, from the
+        residuals as if each were independent."""
+        runs = self.totals[3] / _RUN
+        independent = (self.rmse**2 + (1e-12 * self.extent) ** 2) / _stretch(self.totals[None]) ** 2 * self.H
+        return np.asarray((runs * self.scatter + _FEW * independent) / (runs + _FEW))
+
+    @property
+    def roughness(self) -> float:
+        """Thickness of the planes over their width, root mean square of both clouds' medians."""
         assert self.partners is not None
-        # Each normal's slope has the standard error of a line fit, thickness / (width sqrt(points)).
-        slopes = [np.median(p.thickness / np.maximum(p.width, 1e-300)) for p in (self.planes, self.partners)]
-        return float(slopes[0] ** 2 + slopes[1] ** 2) / self.neighbours
+        ratios = [np.median(p.thickness / np.maximum(p.width, 1e-300)) for p in (self.planes, self.partners)]
+        return float(np.sqrt((ratios[0] ** 2 + ratios[1] ** 2) / 2))
 
     @property
     def rmse(self) -> float:
@@ -202,23 +184,8 @@ def _spread(own: Planes, other: Planes) -> Floats:
 def _stretch(totals: Floats) -> Floats:
     """By how much to lengthen reweighted steps (B,): the loss bends less than its weights say (Huber, Robust
     Statistics, 7.8), and the steps come out short by about a third."""
-    return np.asarray(1 / np.clip(totals[:, 2] / np.maximum(totals[:, 0], 1e-300), 0.5, 1.0))
+    return np.asarray(1 / np.clip(totals[:, 2] / np.maximum(totals[:, 0], 1e-300), _LEAST_BEND, 1.0))
 
 
 def _rms(totals: Floats) -> float:
     return float(np.sqrt(totals[1] / totals[0])) if totals[0] > 0 else 0.0
-
-
-def _best_distinct(poses: Floats, found: Floats, moving: Surface, count: int) -> list[int]:
-    """The rows of the best poses (B, 4, 4), without those that came to the same place as a better one."""
-    middle = moving.places.mean(axis=0)
-    shifts = poses[:, :3, 3] + poses[:, :3, :3] @ middle
-    chosen: list[int] = []
-    for k in np.argsort(-found, kind="stable"):
-        cosines = (np.einsum("bij,ij->b", poses[chosen, :3, :3], poses[k, :3, :3]) - 1) / 2
-        apart = np.linalg.norm(shifts[chosen] - shifts[k], axis=1)
-        if not ((cosines > _SAME_COSINE) & (apart < _SAME * moving.voxel)).any():
-            chosen.append(int(k))
-        if len(chosen) == count:
-            break
-    return chosen

@@ -13,7 +13,7 @@ import click
 
 from ..errors import FieldalignError
 
-VERBS = ("register", "demo")
+VERBS = ("register", "verify", "demo")
 
 
 class LazyVerbs(click.Group):

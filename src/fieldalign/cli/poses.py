@@ -12,19 +12,20 @@ from ..errors import ArgumentError
 from ..motions import Matrix, as_rigid
 
 
-def read_pose(text: str) -> Matrix:
+def read_pose(text: str, name: str = "init") -> Matrix:
     """A rigid motion (4, 4) from a file (.npy, .json, or text of 4 rows) or from 16 numbers, row by row.
 
     A .json file holds 4 rows, or an object with the key T_target_source, as `--json` writes it.
-    Raises ArgumentError where it is none.
+    name: of the argument, in errors. Raises ArgumentError where it is none.
     """
     try:
         values = _from_file(Path(text)) if Path(text).is_file() else np.array(text.replace(",", " ").split(), float)
     except (OSError, ValueError, EOFError) as error:
-        raise ArgumentError(f"init must be a file with a 4 x 4 pose or 16 numbers, but is {text!r}: {error}") from error
+        wanted = "a file with a 4 x 4 pose or 16 numbers"
+        raise ArgumentError(f"{name} must be {wanted}, but is {text!r}: {error}") from error
     if np.size(values) != 16:
-        raise ArgumentError(f"init must hold 16 numbers (4 x 4, row by row), but {text!r} holds {np.size(values)}")
-    return as_rigid(np.reshape(values, (4, 4)), "init")
+        raise ArgumentError(f"{name} must hold 16 numbers (4 x 4, row by row), but {text!r} holds {np.size(values)}")
+    return as_rigid(np.reshape(values, (4, 4)), name)
 
 
 def _from_file(path: Path) -> Any:

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import json
-import sys
 from pathlib import Path
 
 import click
-import numpy as np
 
 import fieldalign as fa
 
 from ..clouds.files import writer_of
 from ..errors import ArgumentError
-from ..whole_file import replacing
+from .answers import tell, write_json
 from .poses import read_pose
 from .progress import stages
 
@@ -75,13 +72,8 @@ def command(
 
             title = f"{Path(source).name} onto {Path(target).name}: {result.reason.value}, overlap {result.overlap:.0%}"
             before_and_after(source_cloud, target_cloud, result.T_target_source, picture, title)
-        if json_path is not None and json_path != "-":
-            _write_text(json_path, _as_json(result))
-    if json_path == "-":
-        click.echo(_as_json(result))
-    else:
-        _print(result)
-    return 0 if result.accepted else 3
+        write_json(result, json_path)
+    return tell(result, json_path)
 
 
 def _settings(method: str, preset: str | None, length_scale: float | None) -> fa.Settings | None:
@@ -101,29 +93,3 @@ def _check_outputs(output: str | None, picture: str | None) -> None:
         from ..reports.picture import checked_path
 
         checked_path(picture)
-
-
-def _as_json(result: fa.RegistrationResult) -> str:
-    return json.dumps(result.to_dict(), indent=1)
-
-
-def _write_text(path: str, text: str) -> None:
-    try:
-        with replacing(path) as unfinished:
-            unfinished.write_text(text)
-    except OSError as error:
-        raise ArgumentError(f"{path} cannot be written: {error.strerror or error}") from error
-
-
-def _print(result: fa.RegistrationResult) -> None:
-    """The pose, so that it can be copied, and what is known of it."""
-    click.echo("T_target_source =")
-    np.savetxt(sys.stdout, result.T_target_source, fmt="% .9f")
-    click.echo(result.reason)
-    click.echo(
-        f"overlap {result.overlap:.0%} of the source, {result.overlap_target:.0%} of the target; "
-        f"rmse {result.rmse:.3g}; {result.iterations} iterations; {sum(result.seconds.values()) * 1e3:.0f} ms"
-    )
-    for name, rows in zip(("source", "target"), result.dropped, strict=True):
-        if rows:
-            click.echo(f"{rows} missing returns (NaN) of the {name} left out")

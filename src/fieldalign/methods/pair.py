@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from ..fields.protocol import Floats
 from ..motions import inverse, translation
 from ..prepared import PreparedCloud
@@ -40,6 +42,11 @@ class Pair:
     def surfaces(self) -> tuple[Surface, Surface]:
         """Of the held and of the moving cloud."""
         return self.held.surface(self.voxel), self.moving.surface(self.voxel)
+
+    @property
+    def middle(self) -> Floats:
+        """Of the moving surface (3,), about its origin."""
+        return np.asarray(self.surfaces()[1].places.mean(axis=0))
 
     def motion(self, G: Floats) -> Floats:
         """T_target_source of a pose between the surfaces' origins."""

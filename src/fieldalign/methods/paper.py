@@ -9,10 +9,11 @@ from ..fields import sampled
 from ..fields.protocol import Floats
 from ..motions import apply, inverse, translation
 from ..prepared import PreparedCloud
-from ..result import Reason, RegistrationResult
+from ..result import RegistrationResult
 from ..settings import Settings
 from ..threads import side_by_side
-from ..verdict import certainty, judge, overlaps, rmse
+from ..verdict import Reason
+from ..verdict.paper import certainty, judge, overlaps, rmse
 
 
 def register_by_paper(

@@ -1,35 +1,22 @@
-"""What can be said of a pose: how much of the clouds agrees, how well it is determined, whether to accept it."""
+"""The verdict of the paper's method, which has one pose and no others to compare it with."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from . import _core
-from .alignment import Alignment
-from .alignment.residual import feature_gradient, row_dot
-from .alignment.robust import Agreement
-from .fields import FieldSample, sampled
-from .fields.protocol import Floats
-from .motions import apply, inverse, reach_of, rotate
-from .prepared import PreparedCloud
-from .result import Reason
+from .. import _core
+from ..alignment import Alignment
+from ..alignment.residual import feature_gradient, row_dot
+from ..fields import FieldSample, sampled
+from ..fields.protocol import Floats
+from ..motions import apply, inverse, reach_of, rotate
+from ..prepared import PreparedCloud
+from .certainty import Certainty, split
+from .reason import Reason
 
 STILL = 1e-3  # of the extent: a last increment that moves some point further has not converged
 COARSE = 0.05  # of the smaller extent: places further apart are never the same, however sparse the points are
-MIN_ON, MIN_PURITY = 0.1, 0.3  # of a surface on the other; of what meets it: with less, what agrees may be chance
 MIN_OVERLAP = 0.2  # of either surface: with less, what agrees may be chance
-
-
-@dataclass(frozen=True, eq=False)
-class Certainty:
-    """Information (6, 6), its pseudo-inverse, the basis (6, k) of what it leaves open, and the point (3,) meant."""
-
-    information: Floats
-    covariance: Floats
-    unobservable: Floats
-    reference_point: Floats
 
 
 def judge(alignment: Alignment, source: PreparedCloud, overlap: tuple[float, float]) -> Reason:
@@ -77,32 +64,4 @@ def certainty(at_source: FieldSample, pseudo: Floats, alignment: Alignment, r: F
     variance = max(float((w * r[kept] ** 2).sum()) / freedom, w.mean() * (1e-12 * scale) ** 2)
     information = _core.information(J, w) / variance
     length = float(np.sqrt(row_dot(places, places).mean()))
-    return split(information, reference, length, 1e-9)
-
-
-def split(information: Floats, reference: Floats, length: float, least: float) -> Certainty:
-    """The observable part and the rest: directions with less than `least` of the best one's information.
-
-    Rotations and translations are compared over a lever of `length`.
-    """
-    if not (np.isfinite(information).all() and information.any() and length > 0):
-        return Certainty(np.zeros((6, 6)), np.zeros((6, 6)), np.eye(6), reference)
-    scale = np.array([1, 1, 1, length, length, length])
-    values, vectors = np.linalg.eigh(information * scale[:, None] * scale)
-    seen = values > least * values[-1]
-    known = vectors[:, seen]
-    observable = (known * values[seen]) @ known.T / scale[:, None] / scale
-    covariance = (known / values[seen]) @ known.T * scale[:, None] * scale
-    basis = np.linalg.qr(vectors[:, ~seen] * scale[:, None])[0]
-    return Certainty(observable, covariance, basis, reference)
-
-
-def judge_robust(there: Agreement, back: Agreement, known: Certainty, rivals: int, has_converged: bool) -> Reason:
-    """By how the surfaces lie on each other there and back, what holds the pose, its rivals, and the last step."""
-    if max(there.on[0], back.on[0]) < MIN_ON or max(there.purity[0], back.purity[0]) < MIN_PURITY:
-        return Reason.LOW_OVERLAP
-    if known.unobservable.shape[1]:
-        return Reason.DEGENERATE
-    if rivals:
-        return Reason.AMBIGUOUS
-    return Reason.ACCEPTED if has_converged else Reason.NOT_CONVERGED
+    return split(information, information, information, reference, length, 1e-9)

@@ -1,0 +1,94 @@
+"""From refined poses to results: what is known of each, and whether it may be used."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..alignment.agreement import Agreement, Apart, both_ways
+from ..fields.protocol import Floats
+from ..motions import apply, inverse, reach_of
+from ..result import RegistrationResult
+from ..verdict import Evidence, freedoms
+from .pair import Pair
+from .refined import Refined, certainty
+
+CLEARLY_OTHER = Apart(0.966, 5.0)  # 15 degrees, or voxels
+RIVAL = 0.9               # of the best score: a pose that the data cannot tell from it
+
+
+@dataclass(frozen=True, eq=False)
+class Contest:
+    """The poses (B, 4, 4) that a pose is compared with, and their scores (B,); whether all poses were searched."""
+
+    poses: Floats
+    scores: Floats
+    searched: bool
+
+    def margin(self, G: Floats, score: float, pair: Pair) -> float:
+        """By what factor a score is better than that of the best clearly different pose."""
+        others = self.scores[CLEARLY_OTHER.differ(self.poses, G, pair.middle, pair.voxel)]
+        return score / max(float(others.max(initial=0.0)), 1e-12)
+
+
+def judged(pair: Pair, refined: list[Refined], contest: Contest, threads: int) -> list[RegistrationResult]:
+    """A result for each pose that agrees about as well as the best, best first."""
+    held, moving = pair.surfaces()
+    if any(r.meets for r in refined):  # to the last digits: what only comes near is no rival
+        refined = [r for r in refined if r.meets]
+        contest = replace(contest, poses=contest.poses[:0], scores=contest.scores[:0])
+    poses = np.stack([r.G for r in refined])
+    there, back = both_ways(held, moving, poses, threads)
+    scores = np.sqrt(there.score * back.score)
+    all_of_them = Contest(np.concatenate([poses, contest.poses]), np.r_[scores, contest.scores], contest.searched)
+    order = [k for k in np.argsort(-scores, kind="stable") if scores[k] >= RIVAL * scores.max()]
+    return [_result(pair, refined[k], (there.of(k), back.of(k)), all_of_them) for k in order]
+
+
+def _result(
+    pair: Pair, refined: Refined, ways: tuple[Agreement, Agreement], contest: Contest
+) -> RegistrationResult:
+    """What is known of one pose; ways: how the moving surface lies on the held one, and the other way."""
+    T, last, (there, back) = pair.motion(refined.G), refined.last, ways
+    known, _ = certainty(pair, refined)
+    score = float(np.sqrt(there.score * back.score)[0])
+    evidence = Evidence(
+        met=float(max(there.met[0], back.met[0])),
+        agreeing=float(np.sqrt(there.purity * back.purity)[0]),
+        margin=contest.margin(refined.G, score, pair),
+        searched=contest.searched,
+        seen_through=_seen_through(pair, T),
+        hold=float(known.hold[0]),
+        off=reach_of(refined.steps[-1].increment, last.extent) / pair.voxel,
+    )
+    reason = evidence.reason
+    on_source, on_target = (there, back) if pair.is_swapped else (back, there)
+    return RegistrationResult(
+        T_target_source=T,
+        accepted=reason.accepts,
+        reason=reason,
+        overlap=float(on_source.on[0]),
+        overlap_target=float(on_target.on[0]),
+        information=known.information,
+        covariance=known.covariance,
+        unobservable=known.unobservable,
+        reference_point=known.reference_point,
+        iterations=len(refined.steps),
+        rmse=last.rmse,
+        seconds={},
+        history=refined.steps,
+        evidence=evidence,
+        freedoms=freedoms(known),
+        dropped=(pair.source.dropped, pair.target.dropped),
+    )
+
+
+def _seen_through(pair: Pair, T: Floats) -> float | None:
+    """The larger share of one cloud's surface that the other's sensor looked through; None where no sensor is known."""
+    shares = []
+    for seen, by, motion in ((pair.source, pair.target, T), (pair.target, pair.source, inverse(T))):
+        if by.sight is not None:
+            surface = seen.surface(pair.voxel)
+            shares.append(by.sight.looked_through(apply(motion, surface.places + surface.origin), pair.voxel).mean())
+    return max(map(float, shares), default=None)

@@ -1,0 +1,30 @@
+"""What a sensor looked through: where the other cloud has a surface there, the pose is wrong, or the scene changed."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import _core
+from ..alignment.residual import row_dot
+from ..fields.protocol import Floats
+
+_RETURNS = 4             # in a cell of directions, on average, if they were spread over the whole sphere
+_FEWEST, _MOST = 8, 256  # cells along a quarter of a circle
+_SHORT = 3.0, 0.05       # voxels, and of the range: by more than both a place is short of what was seen behind it
+
+
+class Sight:
+    """How far a sensor that stood at `eye` (3,) saw in each direction; points: (N, 3), what it saw."""
+
+    def __init__(self, points: Floats, eye: Floats) -> None:
+        cells = int(np.clip(np.sqrt(len(points) / (6 * _RETURNS)), _FEWEST, _MOST))
+        self._view, self._eye = _core.Sight(points, eye, cells), eye
+
+    def looked_through(self, places: Floats, voxel: float) -> NDArray[np.bool_]:
+        """Which places (n, 3) the sensor looked through to something behind them, by some voxels (a length)."""
+        away = places - self._eye
+        seen_to = self._view.ranges(places)
+        short = seen_to - np.sqrt(row_dot(away, away))
+        margin, share = _SHORT
+        return np.asarray(short > np.maximum(margin * voxel, share * seen_to))

@@ -1,0 +1,217 @@
+"""How well a pose is known and what is open, against closed forms."""
+
+import numpy as np
+import pytest
+
+import fieldalign as fa
+from fieldalign.motions import adjoint, apply, exp_twist, inverse, translation
+from fieldalign.verdict import MIN_HOLD, freedoms, split
+
+
+def random_information(rng):
+    """A random symmetric positive matrix (6, 6)."""
+    M = rng.normal(size=(6, 9))
+    return M @ M.T
+
+
+def lever_of(length):
+    return np.array([1, 1, 1, length, length, length])
+
+
+# -------------------------------------------------------------------------------------------------------------- split
+
+
+@pytest.mark.parametrize("length", [0.01, 1.0, 1000.0])
+def test_where_all_is_held_the_covariance_is_the_sandwich(rng, length):
+    """A^-1 S A^-1 (Huber), in any unit, and the information its inverse."""
+    weigh = np.outer(1 / lever_of(length), 1 / lever_of(length))
+    A, S, hold = (random_information(rng) * weigh for _ in range(3))
+    found = split(A, S, hold, np.arange(3.0), length, 1e-9)
+    assert np.allclose(found.covariance * weigh, np.linalg.inv(A / weigh) @ (S / weigh) @ np.linalg.inv(A / weigh))
+    assert np.allclose(found.covariance @ found.information, np.eye(6), atol=1e-6)
+    assert np.array_equal(found.reference_point, np.arange(3.0))
+    assert found.unobservable.shape == (6, 0)
+    assert np.allclose(found.hold, np.linalg.eigvalsh(hold / weigh) / np.linalg.eigvalsh(hold / weigh)[-1])
+
+
+@pytest.fixture(params=[0.01, 1.0, 1000.0])
+def half_open(request, rng):
+    """A split of which two directions are open, its A and S, the known twists (6, 4) and the open ones (6, 2)."""
+    length = request.param
+    Q = np.linalg.qr(rng.normal(size=(6, 6)))[0]
+    weigh = np.outer(1 / lever_of(length), 1 / lever_of(length))
+    A, S = (random_information(rng) * weigh for _ in range(2))
+    hold = (Q * [-1e-5, 1e-4, 2e-3, 0.1, 0.7, 1.0]) @ Q.T * weigh
+    twists = Q * lever_of(length)[:, None]
+    return split(A, S, hold, np.zeros(3), length, 1e-3), A, S, twists[:, 2:], twists[:, :2]
+
+
+def test_a_direction_that_is_hardly_held_is_open(half_open, same_span):
+    found, *_, open_twists = half_open
+    assert same_span(found.unobservable / found.lever, open_twists / found.lever)
+    assert np.allclose(found.unobservable.T @ found.unobservable, np.eye(2), atol=1e-12)
+    assert np.allclose(found.hold, [-1e-5, 1e-4, 2e-3, 0.1, 0.7, 1.0], atol=1e-12)
+
+
+def test_the_known_part_is_a_sandwich_of_the_known_part(half_open):
+    """What is said of the pose with the open twists fixed: the sandwich of A and S as seen by the known ones."""
+    found, A, S, known, open_twists = half_open
+    undo = np.linalg.inv(known.T @ A @ known)
+    weigh = found.lever * found.lever.T
+    expected = known @ undo @ (known.T @ S @ known) @ undo @ known.T
+    assert np.allclose(found.covariance / weigh, expected / weigh, rtol=1e-7, atol=1e-12)
+    assert np.allclose(found.information * weigh, np.linalg.pinv(expected / weigh, rcond=1e-10), rtol=1e-6, atol=1e-9)
+    assert np.allclose((found.information * weigh) @ (open_twists / found.lever), 0, atol=1e-9)
+    assert np.allclose((found.covariance / weigh) @ (open_twists / found.lever), 0, atol=1e-9)
+
+
+def test_a_twist_falls_into_a_part_that_is_open_and_one_that_is_not(half_open, same_span, rng):
+    found, *_, known, open_twists = half_open
+    assert same_span(found.observable / found.lever, known / found.lever)
+    a, b = rng.normal(size=2), rng.normal(size=4)
+    twist = open_twists @ a + known @ b
+    scale = found.lever[:, 0]
+    assert np.allclose(found.open_part(twist) / scale, open_twists @ a / scale, atol=1e-9)
+    assert np.allclose(found.open_part(found.open_part(twist)) / scale, open_twists @ a / scale, atol=1e-9)
+
+
+def test_the_least_share_decides(rng):
+    Q = np.linalg.qr(rng.normal(size=(6, 6)))[0]
+    hold = (Q * [1e-4, 2e-3, 0.1, 0.5, 0.7, 1.0]) @ Q.T
+    for least, open_directions in ((1e-5, 0), (1e-3, 1), (0.01, 2), (0.6, 4)):
+        assert split(hold, hold, hold, np.zeros(3), 1.0, least).unobservable.shape == (6, open_directions)
+
+
+@pytest.mark.parametrize("broken", range(3))
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_what_is_not_finite_leaves_all_open(broken, value):
+    matrices = [np.eye(6) for _ in range(3)]
+    matrices[broken][1, 2] = value
+    assert_all_open(split(*matrices, np.zeros(3), 1.0, 1e-3))
+
+
+@pytest.mark.parametrize(("hold", "length"), [(np.zeros((6, 6)), 1.0), (np.eye(6), 0.0)])
+def test_without_any_hold_all_is_open(hold, length):
+    assert_all_open(split(np.eye(6), np.eye(6), hold, np.zeros(3), length, 1e-3))
+
+
+def assert_all_open(found):
+    assert np.array_equal(found.unobservable, np.eye(6))
+    assert not found.information.any()
+    assert not found.covariance.any()
+    assert not found.hold.any()
+    assert len(freedoms(found)) == 6
+
+
+# ----------------------------------------------------------------------------------------------------------- freedoms
+
+
+def plane(rng):
+    return rng.uniform(-1, 1, (400, 3)) * [1, 1, 0], np.tile([0, 0, 1.0], (400, 1))
+
+
+def ball(rng):
+    normals = rng.normal(size=(400, 3))
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    normals[:, 2] = np.abs(normals[:, 2])  # half of it, so that its centre is not the middle of the points
+    return normals, normals
+
+
+def tube(rng):
+    angle = rng.uniform(0, np.pi, 400)  # half of it, as well
+    normals = np.c_[np.cos(angle), np.sin(angle), 0 * angle]
+    return normals + rng.uniform(-2, 2, (400, 1)) * [0, 0, 1], normals
+
+
+def corridor(rng):
+    walls = np.repeat([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]], 100, axis=0)
+    along = np.cross(walls, [0, 0, 1.0])
+    return walls + rng.uniform(-1, 1, (400, 1)) * along + rng.uniform(-5, 5, (400, 1)) * [0, 0, 1], walls
+
+
+def room(rng):
+    normals = np.repeat(np.eye(3), 150, axis=0)
+    return rng.uniform(0, 2, (450, 3)) * (1 - normals), normals
+
+
+SHAPES = {plane: ["slide", "slide", "turn"], ball: 3 * ["turn"], tube: ["slide", "turn"], corridor: ["slide"],
+          room: []}
+
+
+@pytest.fixture(params=SHAPES, ids=lambda shape: shape.__name__)
+def shape(request):
+    return request.param
+
+
+def known_of(shape, W, rng, unit=1.0):
+    """What exact planes of a shape, moved by W, tell of a pose, about their centroid."""
+    points, normals = shape(rng)
+    points, normals = unit * apply(W, points), normals @ W[:3, :3].T
+    reference = points.mean(axis=0)
+    J = np.c_[np.cross(points - reference, normals), normals]
+    length = np.linalg.norm(np.ptp(points, axis=0)) / 4
+    return split(J.T @ J, J.T @ J, J.T @ J, reference, length, MIN_HOLD)
+
+
+@pytest.mark.parametrize("unit", [1e-3, 1.0, 1e4])
+def test_the_freedoms_of_shapes(any_motion, rng, shape, unit):
+    """Slides along and turns about what the shape says, in the frame that it was moved to."""
+    W = any_motion(rng, 5.0)
+    found = freedoms(known_of(shape, W, rng, unit))
+    assert sorted(freedom.kind for freedom in found) == SHAPES[shape]
+    centre, up = unit * W[:3, 3], W[:3, 2]
+    for freedom in found:
+        assert np.linalg.norm(freedom.axis) == pytest.approx(1)
+        aside = np.cross(freedom.axis, freedom.point - centre)  # how far its line passes by the centre
+        if shape is plane:
+            assert abs(freedom.axis @ up) == pytest.approx(1.0 if freedom.kind == "turn" else 0.0, abs=1e-6)
+        elif shape is ball:
+            assert np.linalg.norm(aside) < 1e-6 * unit
+        else:
+            assert abs(freedom.axis @ up) == pytest.approx(1, abs=1e-9)
+            assert freedom.kind == "slide" or np.linalg.norm(aside) < 1e-6 * unit
+    axes = [freedom.axis for freedom in found if freedom.kind == "slide"] if shape is plane else []
+    assert len(axes) < 2 or abs(axes[0] @ axes[1]) < 1e-9
+
+
+def twist_of(freedom):
+    """Of a turn by a radian, or a shift by 1, about the freedom's own point."""
+    none = np.zeros(3)
+    return np.r_[freedom.axis, none] if freedom.kind == "turn" else np.r_[none, freedom.axis]
+
+
+def test_a_freedom_moves_the_surface_into_itself(any_motion, rng, shape):
+    """Each, turned by half a radian or shifted by half of the size: the points stay on their shape."""
+    W = any_motion(rng, 5.0)
+    distance = {plane: lambda x: x[:, 2], ball: lambda x: np.linalg.norm(x, axis=1) - 1,
+                tube: lambda x: np.linalg.norm(x[:, :2], axis=1) - 1,
+                corridor: lambda x: np.abs(x[:, :2]).max(axis=1) - 1, room: lambda x: x.min(axis=1)}[shape]
+    points, _ = shape(np.random.default_rng(1))
+    for freedom in freedoms(known_of(shape, W, rng)):
+        about = translation(freedom.point) @ exp_twist(0.5 * twist_of(freedom)) @ translation(-freedom.point)
+        moved = apply(inverse(W) @ about @ W, points)
+        assert np.abs(distance(moved)).max() < 1e-6
+        assert np.abs(moved - points).max() > 0.1
+
+
+def test_the_unobservable_directions_are_those_of_the_freedoms(any_motion, rng, shape, same_span):
+    """As twists about the reference point, a turn about a line elsewhere is a turn and a shift."""
+    known = known_of(shape, any_motion(rng, 5.0), rng)
+    twists = [adjoint(translation(freedom.point - known.reference_point)) @ twist_of(freedom)
+              for freedom in freedoms(known)]
+    assert same_span(known.unobservable, np.reshape(twists, (-1, 6)).T)
+
+
+def test_a_slide_that_noise_bends_is_a_slide(rng):
+    """Of a plane whose points are rough the open twists turn a little."""
+    points, normals = plane(rng)
+    normals = normals + 0.01 * rng.normal(size=(400, 3))
+    J = np.c_[np.cross(points, normals), normals]
+    found = freedoms(split(J.T @ J, J.T @ J, J.T @ J, np.zeros(3), 0.7, MIN_HOLD))
+    assert sorted(freedom.kind for freedom in found) == SHAPES[plane]
+
+
+def test_a_freedom_is_told_in_words():
+    point, axis = np.array([1, 2.5, -3]), np.array([0, 0.6, -0.8])
+    assert str(fa.Freedom("slide", axis, point)) == "slide along (0, 0.6, -0.8)"
+    assert str(fa.Freedom("turn", axis, point)) == "turn about (0, 0.6, -0.8) through (1, 2.5, -3)"
