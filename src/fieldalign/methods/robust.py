@@ -32,7 +32,7 @@ from .pair import Pair
 from .refined import Refined, at_copies, last_level, left_at, refine
 
 _MOST_RIVALS = 4            # poses that the last level sees
-_AROUND, _STRAY = 24, 0.1   # poses tried around a guess; how far they are shifted, of the extent
+_AROUND, _STRAY = 12, 0.1   # poses tried around a guess; how far they are shifted, of the extent
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,8 +109,8 @@ def _prepared_pair(
         threads,
         lambda: held.fine_grid,
         lambda: searches and held.pairs,
-        lambda: held.coarse_grid,
-        lambda: moving.coarse_grid,
+        lambda: (held.coarse_grid, held.weights),
+        lambda: (moving.coarse_grid, moving.weights),
     )
     clock.lap("lookups")
     return pair
@@ -129,8 +129,10 @@ def _starting_poses(pair: Pair, start: Start, guess: Floats | None, seed: int, t
 def _contest(
     pair: Pair, poses: Floats, scores: Floats, guess: Floats | None, searched: bool, seed: int, threads: int
 ) -> Contest:
-    """The poses that others are measured by: those found, and where there is a guess, what is around it."""
-    if guess is not None:
+    """The poses that a pose is measured by: those found, and where none of these is clearly another, some around the
+    guess."""
+    found_others = len(poses) and CLEARLY_OTHER.differ(poses, poses[0], pair.middle, pair.voxel).any()
+    if guess is not None and not found_others:
         around = anneal(*pair.surfaces(), _around(guess, pair, seed), seed, threads)
         poses, scores = np.concatenate([poses, around[0]]), np.r_[scores, around[1]]
     return Contest(poses, scores, searched)

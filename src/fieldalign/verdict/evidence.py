@@ -10,7 +10,7 @@ import numpy as np
 from .reason import Reason
 
 # How they were found, and what they mean as levels of a test: docs/verdict.md.
-MIN_MARGIN = 2.5         # less than one wrong pose in a thousand is so much better than all others
+MIN_MARGIN = 2.5         # one wrong pose in 260 is so much better than all others
 MIN_AGREEING = 0.25      # of what meets: planes that lie on other planes by chance contradict each other elsewhere
 MIN_MET = 0.33           # of a surface: with less in contact, what agrees may be chance
 MIN_HOLD = 3e-3          # of the best held direction's: less is what noise gives
