@@ -37,7 +37,9 @@ def register(
     """The rigid motion that brings `source` onto `target`: from any pose, without a guess or a length.
 
     source, target: points (N, 3), PointClouds, paths, DistanceFields or prepared clouds (fa.prepare), in one unit.
-    init: (4, 4), a guess of T_target_source. The search is then skipped, or confined by the two arguments below.
+        Where a cloud knows its viewpoint, a pose that its sensor looked through is refused.
+    init: (4, 4), a guess of T_target_source. The search is then skipped, or confined by the two arguments below. What
+        nothing holds (a slide along a wall, a turn about a pole) stays at the guess; without one it is arbitrary.
     search: True: search, though there is an init; False: never; None: where there is no init, or where it is confined.
     search_radius, search_angle: confine the search to so far from init: the shift of the overlap's middle (the clouds'
         unit), and the turn (degrees, up to 180); None: as far as need be.
@@ -50,6 +52,8 @@ def register(
     threads: None means all cores.
     drop_nonfinite: NaN rows are missing returns, dropped and counted; infinity always raises.
     dof, scale: not available in this version; anything but the default raises.
+
+    The result says whether it may be used and why: docs/verdict.md.
 
     Raises ArgumentError for a cloud of the wrong shape, with fewer than 3 distinct points or with infinity, for an init
     that is not rigid, and for arguments out of range or that do not go together; CloudFileError for a file that cannot

@@ -13,7 +13,7 @@ from ..result import RegistrationResult
 from ..settings import Settings
 from ..threads import side_by_side
 from ..verdict import Reason
-from ..verdict.paper import certainty, judge, overlaps, rmse
+from .paper_verdict import certainty, judge, overlaps, rmse
 
 
 def register_by_paper(

@@ -11,8 +11,7 @@ from ..fields import FieldSample, sampled
 from ..fields.protocol import Floats
 from ..motions import apply, inverse, reach_of, rotate
 from ..prepared import PreparedCloud
-from .certainty import Certainty, split
-from .reason import Reason
+from ..verdict import Certainty, Reason, split
 
 STILL = 1e-3  # of the extent: a last increment that moves some point further has not converged
 COARSE = 0.05  # of the smaller extent: places further apart are never the same, however sparse the points are

@@ -10,9 +10,9 @@ from scipy.spatial.transform import RigidTransform
 import fieldalign as fa
 from fieldalign.alignment import Alignment, Step
 from fieldalign.fields import FieldSample, sampled
+from fieldalign.methods.paper_verdict import MIN_OVERLAP, STILL, certainty, judge, overlaps, rmse
 from fieldalign.motions import apply, exp_twist, inverse, translation
 from fieldalign.prepared import prepare
-from fieldalign.verdict.paper import MIN_OVERLAP, STILL, certainty, judge, overlaps, rmse
 
 
 class Spheres:
