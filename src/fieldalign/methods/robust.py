@@ -32,7 +32,7 @@ from .pair import Pair
 from .refined import Refined, at_copies, last_level, left_at, refine
 
 _MOST_RIVALS = 4            # poses that the last level sees
-_AROUND, _STRAY = 12, 0.1   # poses tried around a guess; how far they are shifted, of the extent
+_AROUND, _STRAY = 8, 0.1   # poses tried around a guess; how far they are shifted, of the extent
 
 
 @dataclass(frozen=True, eq=False)
