@@ -168,26 +168,9 @@ def open3d_at(source, target, voxel: float, T: np.ndarray) -> tuple:
 
 def gicp_from(source, target, voxel: float, T: np.ndarray) -> tuple:
     """small_gicp's result from a pose, on the benchmark's last level, and how many source points it had."""
-    import small_gicp
-    from peers.gicp import LAST
+    from peers.gicp import LAST, aligned
 
-    sampling, reach, neighbours = LAST
-    (moving, _), (fixed, tree) = (
-        small_gicp.preprocess_points(cloud, sampling * voxel, num_neighbors=neighbours, num_threads=1)
-        for cloud in (source, target)
-    )
-    found = small_gicp.align(
-        fixed,
-        moving,
-        tree,
-        T,
-        registration_type="GICP",
-        max_correspondence_distance=reach * voxel,
-        translation_epsilon=min(1e-3, 0.02 * voxel),
-        max_iterations=50,
-        num_threads=1,
-    )
-    return found, moving.size()
+    return aligned(LAST, source, target, voxel, 1, T)
 
 
 def sample(rows: list[dict], right: int, wrong: int) -> list[tuple[int, np.ndarray]]:

@@ -280,6 +280,7 @@ void bind_search(nb::module_& m) {
         "probe_normals"_a, "confinement"_a.none(), "settings"_a, "threads"_a);
   m.def("robust_sums", &plane_sums, "x"_a, "own_normals"_a, "means"_a, "normals"_a, "spreads"_a, "min_cosine"_a,
         "reach"_a);
+  m.attr("RUN") = CertaintySums::kRun;
   m.def("coplanar", &coplanar, "places"_a, "normals"_a, "witness_places"_a, "witness_normals"_a, "distance"_a,
         "min_cosine"_a, "threads"_a);
   m.def("take_steps", &take_steps, "poses"_a, "H"_a, "g"_a, "stretch"_a, "largest_turn"_a);

@@ -29,20 +29,27 @@ def refine(source, target, voxel, threads, init, fine=False) -> np.ndarray:
 
 
 def _levels(levels, source, target, voxel, threads, T) -> np.ndarray:
-    for sampling, reach, neighbours in levels:
-        (moving, _), (fixed, tree) = (
-            small_gicp.preprocess_points(cloud, sampling * voxel, num_neighbors=neighbours, num_threads=threads)
-            for cloud in (source, target)
-        )
-        T = small_gicp.align(
-            fixed,
-            moving,
-            tree,
-            T,
-            registration_type="GICP",
-            max_correspondence_distance=reach * voxel,
-            translation_epsilon=min(1e-3, 0.02 * voxel),
-            max_iterations=50,
-            num_threads=threads,
-        ).T_target_source
+    for level in levels:
+        T = aligned(level, source, target, voxel, threads, T)[0].T_target_source
     return T
+
+
+def aligned(level, source, target, voxel, threads, T) -> tuple:
+    """small_gicp's result on one level, and how many source points it had."""
+    sampling, reach, neighbours = level
+    (moving, _), (fixed, tree) = (
+        small_gicp.preprocess_points(cloud, sampling * voxel, num_neighbors=neighbours, num_threads=threads)
+        for cloud in (source, target)
+    )
+    found = small_gicp.align(
+        fixed,
+        moving,
+        tree,
+        T,
+        registration_type="GICP",
+        max_correspondence_distance=reach * voxel,
+        translation_epsilon=min(1e-3, 0.02 * voxel),
+        max_iterations=50,
+        num_threads=threads,
+    )
+    return found, moving.size()

@@ -139,6 +139,8 @@ def robust_sums(
     widely each residual spreads (n,). The scale is three standard deviations of the residuals themselves. Then what
     holds the pose (6, 6), free of the normals' noise, and the scatter (6, 6) of the gradient."""
 
+RUN: int  # neighbouring pseudo points whose gradients are added up before the scatter is taken
+
 def coplanar(
     places: Floats,
     normals: Floats,

@@ -62,6 +62,11 @@ class Surface:
         return float(np.linalg.norm(np.ptp(self.places, axis=0)))
 
     @lazy
+    def middle(self) -> Floats:
+        """The surfels' mean (3,)."""
+        return np.asarray(self.places.mean(axis=0))
+
+    @lazy
     def sparse(self) -> NDArray[np.uint32]:
         """Rows of some surfels, spread evenly, at most a thousand."""
         bounds = np.stack([self.places.min(axis=0), self.places.max(axis=0)])
@@ -104,7 +109,7 @@ class Surface:
 
 def main_axes(held: Surface, moving: Surface) -> list[Floats]:
     """The four motions (4, 4) that lay the main axes of one surface on those of the other, middle on middle."""
-    (middle, axes), (onto_middle, onto_axes) = (_axes(surface.places) for surface in (moving, held))
+    (middle, axes), (onto_middle, onto_axes) = (_axes(surface) for surface in (moving, held))
     motions = []
     for signs in ((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)):
         T = np.eye(4)
@@ -114,13 +119,12 @@ def main_axes(held: Surface, moving: Surface) -> list[Floats]:
     return motions
 
 
-def _axes(places: Floats) -> tuple[Floats, Floats]:
+def _axes(surface: Surface) -> tuple[Floats, Floats]:
     """Middle (3,) and main axes (3, 3), right-handed, in columns."""
-    middle = places.mean(axis=0)
-    away = places - middle
+    away = surface.places - surface.middle
     axes = np.linalg.eigh(np.einsum("ni,nj->ij", away, away))[1]  # no BLAS, whose sums may change with its threads
     axes[:, 0] *= np.linalg.det(axes)
-    return middle, axes
+    return surface.middle, axes
 
 
 def _least_count(counts: NDArray[np.uint32]) -> int:

@@ -119,9 +119,10 @@ def test_both_clouds_are_asked_and_neither_is_the_first(rng):
     there, back = both_ways(held, moving, poses, 2)
     assert np.array_equal(there.score, agreement(held, moving, poses, 2).score)
     assert np.array_equal(back.score, agreement(moving, held, np.stack([inverse(p) for p in poses]), 2).score)
-    score = mutual_score(held, moving, poses, 2)
+    score = mutual_score(*both_ways(held, moving, poses, 2))
     assert np.allclose(score**2, there.score * back.score)
-    assert np.allclose(score, mutual_score(moving, held, np.stack([inverse(p) for p in poses]), 2), atol=1e-6)
+    swapped = both_ways(moving, held, np.stack([inverse(p) for p in poses]), 2)
+    assert np.allclose(score, mutual_score(*swapped), atol=1e-6)
 
 
 # -------------------------------------------------------------------------------------------------------- other poses

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from fieldalign.alignment import descend
-from fieldalign.alignment.agreement import mutual_score
+from fieldalign.alignment.agreement import both_ways, mutual_score
 from fieldalign.alignment.robust import LEVELS, FieldStage, GridStage, anneal
 from fieldalign.clouds.simulated import simulate_pair
 from fieldalign.evaluation import rotation_error, translation_error
@@ -85,7 +85,7 @@ def test_annealing_finds_the_right_one_among_wrong_poses(rng):
     assert translation_error(poses[0], G) < 0.05
     assert (np.diff(scores) <= 0).all()
     assert len(poses) <= LEVELS[-1].keep
-    assert np.array_equal(scores, mutual_score(held, moving, poses, 2))
+    assert np.array_equal(scores, mutual_score(*both_ways(held, moving, poses, 2)))
 
 
 def test_poses_that_come_to_one_place_are_one(rng):

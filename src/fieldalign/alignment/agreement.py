@@ -63,10 +63,9 @@ def both_ways(held: Surface, moving: Surface, poses: Floats, threads: int) -> tu
     return agreement(held, moving, poses, threads), agreement(moving, held, back, threads)
 
 
-def mutual_score(held: Surface, moving: Surface, poses: Floats, threads: int) -> Floats:
-    """Of poses (B, 4, 4), (B,): the geometric mean of the scores of both ways."""
-    there, back = both_ways(held, moving, poses, threads)
-    return np.sqrt(there.score * back.score)
+def mutual_score(there: Agreement, back: Agreement) -> Floats:
+    """The geometric mean of the scores of both ways (B,)."""
+    return np.asarray(np.sqrt(there.score * back.score))
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from .. import _core
 from ..fields.protocol import DistanceField, Floats, Planes, planes_near
 from ..motions import apply, exp_twist, reach_of, rotate
 from ..surface import Surface
-from .agreement import MIN_COSINE, Apart, agreement, best_distinct, mutual_score
+from .agreement import MIN_COSINE, Apart, agreement, best_distinct, both_ways, mutual_score
 from .residual import row_dot
 from .solver import Step, descend
 
@@ -38,7 +38,7 @@ _SHARPEST = 0.3       # voxels: no coarse level weighs residuals by less
 _SCORED = 600         # surfels that a pruning goes by
 _LEAST_BEND = 0.6     # of the weights: a step is never so long that it ends as far beyond the end
 _SAME = Apart(0.9986, 1.0)  # 3 degrees and a voxel: poses that came to the same place
-_RUN, _FEW = 16, 30    # pseudo points in a run (cpp/linearise.hpp); runs that are too few to tell a scatter
+_FEW = 30             # runs of pseudo points: too few to tell a scatter
 
 
 class GridStage:
@@ -68,13 +68,12 @@ class GridStage:
 def anneal(held: Surface, moving: Surface, poses: Floats, seed: int, threads: int) -> tuple[Floats, Floats]:
     """The best few of many poses (B, 4, 4), refined level by level, best first, and their scores."""
     rng = np.random.default_rng(seed)
-    middle = moving.places.mean(axis=0)
     for level in LEVELS:
         poses, _ = descend(GridStage(held, moving, level, rng, threads), poses)
         if len(poses) > 1:
             found = agreement(held, moving, poses, threads, rng.integers(0, len(moving), _SCORED)).score
-            poses = poses[best_distinct(poses, found, middle, _SAME, moving.voxel, level.keep)]
-    found = mutual_score(held, moving, poses, threads)
+            poses = poses[best_distinct(poses, found, moving.middle, _SAME, moving.voxel, level.keep)]
+    found = mutual_score(*both_ways(held, moving, poses, threads))
     order = np.argsort(-found, kind="stable")
     return poses[order], found[order]
 
@@ -146,7 +145,7 @@ class FieldStage:
     def gradient_scatter(self) -> Floats:
         """Covariance (6, 6) of the gradient: from runs of neighbouring pseudo points, and where these are few, from the
         residuals as if each were independent."""
-        runs = self.totals[3] / _RUN
+        runs = self.totals[3] / _core.RUN
         independent = (self.rmse**2 + (1e-12 * self.extent) ** 2) / _stretch(self.totals[None]) ** 2 * self.H
         return np.asarray((runs * self.scatter + _FEW * independent) / (runs + _FEW))
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..alignment.agreement import Agreement, Apart, both_ways
+from ..alignment.agreement import Agreement, Apart, both_ways, mutual_score
 from ..fields.protocol import Floats
 from ..motions import apply, inverse, reach_of
 from ..result import RegistrationResult
@@ -40,7 +40,7 @@ def judged(pair: Pair, refined: list[Refined], contest: Contest, threads: int) -
         contest = replace(contest, poses=contest.poses[:0], scores=contest.scores[:0])
     poses = np.stack([r.G for r in refined])
     there, back = both_ways(held, moving, poses, threads)
-    scores = np.sqrt(there.score * back.score)
+    scores = mutual_score(there, back)
     all_of_them = Contest(np.concatenate([poses, contest.poses]), np.r_[scores, contest.scores], contest.searched)
     order = [k for k in np.argsort(-scores, kind="stable") if scores[k] >= RIVAL * scores.max()]
     return [_result(pair, refined[k], (there.of(k), back.of(k)), all_of_them) for k in order]
@@ -52,11 +52,10 @@ def _result(
     """What is known of one pose; ways: how the moving surface lies on the held one, and the other way."""
     T, last, (there, back) = pair.motion(refined.G), refined.last, ways
     known, _ = certainty(pair, refined)
-    score = float(np.sqrt(there.score * back.score)[0])
     evidence = Evidence(
         met=float(max(there.met[0], back.met[0])),
         agreeing=float(np.sqrt(there.purity * back.purity)[0]),
-        margin=contest.margin(refined.G, score, pair),
+        margin=contest.margin(refined.G, float(mutual_score(there, back)[0]), pair),
         searched=contest.searched,
         seen_through=_seen_through(pair, T),
         hold=float(known.hold[0]),

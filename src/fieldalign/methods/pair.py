@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from ..fields.protocol import Floats
 from ..motions import inverse, translation
 from ..prepared import PreparedCloud
@@ -46,7 +44,7 @@ class Pair:
     @property
     def middle(self) -> Floats:
         """Of the moving surface (3,), about its origin."""
-        return np.asarray(self.surfaces()[1].places.mean(axis=0))
+        return self.surfaces()[1].middle
 
     def motion(self, G: Floats) -> Floats:
         """T_target_source of a pose between the surfaces' origins."""
