@@ -13,7 +13,7 @@ import click
 
 from ..errors import FieldalignError
 
-VERBS = ("register", "verify", "demo")
+VERBS = ("register", "verify", "deviation", "demo")
 
 
 class LazyVerbs(click.Group):

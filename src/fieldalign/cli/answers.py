@@ -14,13 +14,13 @@ from ..errors import ArgumentError
 from ..whole_file import replacing
 
 
-def write_json(result: fa.RegistrationResult, path: str | None) -> None:
+def write_json(result: fa.RegistrationResult | fa.Deviation, path: str | None) -> None:
     """Writes the result to a file, whole or not at all; nothing for None and for "-", which is stdout."""
     if path is None or path == "-":
         return
     try:
         with replacing(path) as unfinished:
-            unfinished.write_text(_as_json(result))
+            unfinished.write_text(as_json(result))
     except OSError as error:
         raise ArgumentError(f"{path} cannot be written: {error.strerror or error}") from error
 
@@ -28,13 +28,14 @@ def write_json(result: fa.RegistrationResult, path: str | None) -> None:
 def tell(result: fa.RegistrationResult, json_path: str | None) -> int:
     """Prints the answer, as JSON where that is asked for on stdout; the exit status."""
     if json_path == "-":
-        click.echo(_as_json(result))
+        click.echo(as_json(result))
     else:
         _print(result)
     return 0 if result.accepted else 3
 
 
-def _as_json(result: fa.RegistrationResult) -> str:
+def as_json(result: fa.RegistrationResult | fa.Deviation) -> str:
+    """The result as JSON."""
     return json.dumps(result.to_dict(), indent=1)
 
 

@@ -8,9 +8,10 @@ import click
 
 import fieldalign as fa
 
-from ..clouds.files import writer_of
 from ..errors import ArgumentError
+from ..fields.files import read_shape
 from .answers import tell, write_json
+from .files import check_output, check_picture, drawn, write_moved
 from .poses import read_pose
 from .progress import stages
 
@@ -48,30 +49,32 @@ def command(
 ) -> int:
     """Find the motion that brings SOURCE onto TARGET, from any pose.
 
-    SOURCE and TARGET are scans in one unit: .ply, .pcd, .xyz, .txt, .csv, .npy, .npz, .bin, .las, .laz, .e57, .obj,
-    .stl.
+    SOURCE and TARGET are in one unit: scans (.ply, .pcd, .xyz, .txt, .csv, .npy, .npz, .bin, .las, .laz, .e57, .obj),
+    meshes, taken by their triangles (.stl, .ply, .obj, .off), or volumes (.nrrd, .nhdr, .npz with `values`).
     """
     chosen = _settings(method, settings, length_scale)
     guess = None if init is None else read_pose(init)
-    _check_outputs(output, picture)
+    check_output(output)
+    check_picture(picture)
     with stages("reading source", "reading target", "aligning", "writing") as stage:
         stage()
-        source_cloud = fa.read_cloud(source)
+        source_shape = read_shape(source)
+        check_output(output, source_shape)
         stage()
-        target_cloud = fa.read_cloud(target)
+        target_shape = read_shape(target)
         stage()
         result = fa.register(
-            source_cloud, target_cloud, init=guess, search_radius=search_radius, search_angle=search_angle,
+            source_shape, target_shape, init=guess, search_radius=search_radius, search_angle=search_angle,
             method=method, settings=chosen, seed=seed, threads=threads,
         )
         stage()
         if output is not None:
-            fa.write_cloud(output, source_cloud.transformed(result.T_target_source))
+            write_moved(output, source_shape, result.T_target_source)
         if picture is not None:
             from ..reports.picture import before_and_after
 
             title = f"{Path(source).name} onto {Path(target).name}: {result.reason.value}, overlap {result.overlap:.0%}"
-            before_and_after(source_cloud, target_cloud, result.T_target_source, picture, title)
+            before_and_after(drawn(source_shape), drawn(target_shape), result.T_target_source, picture, title)
         write_json(result, json_path)
     return tell(result, json_path)
 
@@ -83,13 +86,3 @@ def _settings(method: str, preset: str | None, length_scale: float | None) -> fa
             raise ArgumentError("--settings and --length-scale belong to --method paper; the robust method takes none")
         return None
     return fa.PRESETS[preset or "indoor"].scaled(length_scale or 1.0)
-
-
-def _check_outputs(output: str | None, picture: str | None) -> None:
-    """What cannot be written is said before the work, not after it."""
-    if output is not None:
-        writer_of(output)
-    if picture is not None:
-        from ..reports.picture import checked_path
-
-        checked_path(picture)

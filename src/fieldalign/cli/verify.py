@@ -6,6 +6,7 @@ import click
 
 import fieldalign as fa
 
+from ..fields.files import read_shape
 from .answers import tell, write_json
 from .poses import read_pose
 from .progress import stages
@@ -30,10 +31,10 @@ def command(
     T_target_source = read_pose(pose, "pose")
     with stages("reading source", "reading target", "judging") as stage:
         stage()
-        source_cloud = fa.read_cloud(source)
+        source_shape = read_shape(source)
         stage()
-        target_cloud = fa.read_cloud(target)
+        target_shape = read_shape(target)
         stage()
-        result = fa.verify(source_cloud, target_cloud, T_target_source, search=search, seed=seed, threads=threads)
+        result = fa.verify(source_shape, target_shape, T_target_source, search=search, seed=seed, threads=threads)
         write_json(result, json_path)
     return tell(result, json_path)

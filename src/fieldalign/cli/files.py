@@ -1,0 +1,48 @@
+"""What the commands move, write and draw: clouds, meshes and volumes alike; and what can be written at all."""
+
+from __future__ import annotations
+
+import fieldalign as fa
+
+from ..clouds.files import writer_of
+from ..errors import ArgumentError
+from ..fields import DistanceField, MeshField, spread_over
+from ..fields.files import check_mesh_path, is_mesh_path, write_mesh
+from ..motions import Matrix, apply
+
+Shape = fa.PointCloud | DistanceField
+
+_DRAWN = 30_000  # places that stand for a surface in a picture
+
+
+def check_output(path: str | None, source: Shape | None = None) -> None:
+    """Raises where a source cannot be written to a path; without a source, where none could be."""
+    if path is None:
+        return
+    if isinstance(source, MeshField) or (source is None and is_mesh_path(path)):
+        check_mesh_path(path)
+    elif source is None or isinstance(source, fa.PointCloud):
+        writer_of(path)
+    else:
+        raise ArgumentError(f"{path} cannot be written: the source must be points or triangles, but is a volume")
+
+
+def check_picture(path: str | None) -> None:
+    """Raises where a picture cannot be written to a path."""
+    if path is not None:
+        from ..reports.picture import checked_path
+
+        checked_path(path)
+
+
+def write_moved(path: str, source: Shape, T: Matrix) -> None:
+    """Writes a cloud, or the triangles of a mesh, moved by T (4, 4)."""
+    if isinstance(source, MeshField):
+        write_mesh(path, apply(T, source.vertices), source.faces)
+    elif isinstance(source, fa.PointCloud):
+        fa.write_cloud(path, source.transformed(T))
+
+
+def drawn(shape: Shape) -> fa.PointCloud:
+    """A cloud as it is, or places on a surface."""
+    return shape if isinstance(shape, fa.PointCloud) else fa.PointCloud(spread_over(shape, _DRAWN))
