@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
@@ -61,9 +61,10 @@ def read_cloud(path: PathLike) -> PointCloud:
     Raises CloudFileError where the file is missing, truncated, foreign, promises what it does not hold, or
     holds several clouds and none is named; MissingExtraError where .las, .laz or .e57 need an absent extra.
     """
-    file, part = _split(path)
-    with _errors_naming(file, "read"):
-        form = _format_of_existing(file)
+    file, part = split_part(path)
+    with errors_naming(file, "read"):
+        check_existing(file, FORMATS)
+        form = FORMATS[file.suffix.lower()]
         return form.read(file, part) if form.has_parts else form.read(file)
 
 
@@ -72,9 +73,10 @@ def read_clouds(path: PathLike) -> Iterator[PointCloud]:
 
     Raises as read_cloud does; what the check of the whole file shows, at once.
     """
-    file, part = _split(path)
-    with _errors_naming(file, "read"):
-        form = _format_of_existing(file)
+    file, part = split_part(path)
+    with errors_naming(file, "read"):
+        check_existing(file, FORMATS)
+    form = FORMATS[file.suffix.lower()]
     if form.read_all is None or part is not None:
         return iter([read_cloud(path)])
     return _named_scans(file, form.read_all)
@@ -91,7 +93,7 @@ def write_cloud(path: PathLike, cloud: PointCloud | ArrayLike) -> None:
     cloud = cloud if isinstance(cloud, PointCloud) else PointCloud(np.asarray(cloud))
     file = Path(path)
     write = writer_of(path)
-    with _errors_naming(file, "written"), replacing(file) as temporary:
+    with errors_naming(file, "written"), replacing(file) as temporary:
         left_out = write(temporary, cloud)
     if left_out:
         logger.warning("%s: %s files have no place for %s", file, file.suffix, ", ".join(left_out))
@@ -109,7 +111,7 @@ def writer_of(path: PathLike) -> Callable[[Path, PointCloud], list[str]]:
     return form.write
 
 
-def _split(path: PathLike) -> tuple[Path, str | None]:
+def split_part(path: PathLike) -> tuple[Path, str | None]:
     """The file, and what '#' names in a format that has parts; a file that has this very name comes first."""
     stem, sign, part = os.fspath(path).rpartition("#")
     form = FORMATS.get(Path(stem).suffix.lower())
@@ -118,25 +120,25 @@ def _split(path: PathLike) -> tuple[Path, str | None]:
     return Path(path), None
 
 
-def _format_of_existing(file: Path) -> Format:
+def check_existing(file: Path, suffixes: Collection[str]) -> None:
+    """Raises CloudFileError where there is no file with anything in it, or its suffix is none of these."""
     if not file.exists():
         raise CloudFileError("does not exist")
     if not file.is_file():
         raise CloudFileError("is a folder, not a file" if file.is_dir() else "is not a regular file")
-    if file.suffix.lower() not in FORMATS:
-        raise CloudFileError(f"has the suffix {file.suffix!r}, but clouds are read from {', '.join(FORMATS)}")
+    if file.suffix.lower() not in suffixes:
+        raise CloudFileError(f"has the suffix {file.suffix!r}, but clouds are read from {', '.join(suffixes)}")
     if file.stat().st_size == 0:
         raise CloudFileError("is empty (0 bytes)")
-    return FORMATS[file.suffix.lower()]
 
 
 def _named_scans(file: Path, read_all: Callable[[Path], Iterator[PointCloud]]) -> Iterator[PointCloud]:
-    with _errors_naming(file, "read"):
+    with errors_naming(file, "read"):
         yield from read_all(file)
 
 
 @contextmanager
-def _errors_naming(file: Path, verb: str) -> Iterator[None]:
+def errors_naming(file: Path, verb: str) -> Iterator[None]:
     """Gives a CloudFileError the name of its file, and makes one of whatever else is raised."""
     try:
         yield

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import ArgumentError, FieldError
-from .protocol import FieldSample, Floats
+from .protocol import FieldSample, Floats, newton_foot
+from .torch_module import as_torch_module
 
 _PROBES = 512   # places in the bounds that show whether values are negative somewhere
 _STEP = 6e-6    # of the bounds' diagonal, between the values that a derivative is made of: about the cube root of 2^-53
@@ -19,8 +20,10 @@ class CallableField:
     """The distance field that a function says; immutable.
 
     function: places (L, 3) -> distances (L,) to the surface, in the places' unit; negative inside, if it knows a side.
+        Or a torch.nn.Module that takes tensors (L, 3) to (L,) or (L, 1); it is asked in its own precision, where it is.
     bounds: (2, 3), lowest and highest corner of a box around the surface: there the surface is sampled.
-    gradient: places (L, 3) -> the distance's derivative (L, 3); None: by central differences, six more values a place.
+    gradient: places (L, 3) -> the distance's derivative (L, 3); None: by the module's autograd, and for other functions
+        by central differences, six more values a place.
     signed: whether the function is negative on one side; None: seen at some places in the bounds.
 
     A function that is not quite a distance (a fitted model) may be given: feet are one Newton step away, and normals
@@ -43,7 +46,12 @@ class CallableField:
                 raise ArgumentError(f"{name} must be a function of places (L, 3), but is {given!r}")
         if signed not in (True, False, None):
             raise ArgumentError(f"signed must be True, False or None, but is {signed!r}")
-        self._function, self._gradient = function, gradient
+        module = as_torch_module(function)
+        self._function, self._gradient, self._with_gradient = function, gradient, None
+        if module is not None:
+            self._function = module
+            if gradient is None:
+                self._gradient, self._with_gradient = module.gradient, module.with_gradient
         self.bounds = _checked_bounds(bounds)
         low, high = self.bounds
         places = np.random.default_rng(0).uniform(low, high, (_PROBES, 3))
@@ -57,10 +65,8 @@ class CallableField:
         Raises FieldError where the function raises or answers nonsense.
         """
         places = np.ascontiguousarray(x, float)
-        value, gradient = self._values(places), self._gradients(places)
-        # By the slope's square, where it is not one: the zero of the tangent (Newton).
-        slope = np.maximum(np.einsum("li,li->l", gradient, gradient), 1e-12)
-        foot = places - (value / slope)[:, None] * gradient
+        value, gradient = self._values_and_gradients(places)
+        foot = newton_foot(places, value, gradient)
         return FieldSample(value, gradient, foot, lambda: self._normals(foot))
 
     def _normals(self, feet: Floats) -> Floats:
@@ -69,6 +75,13 @@ class CallableField:
 
     def _values(self, places: Floats) -> Floats:
         return _asked(self._function, "function", places, (len(places),))
+
+    def _values_and_gradients(self, places: Floats) -> tuple[Floats, Floats]:
+        """Both, of a module from one pass."""
+        if self._with_gradient is None:
+            return self._values(places), self._gradients(places)
+        value, gradient = _tried(self._with_gradient, "function", places)
+        return _checked(value, "function", (len(places),)), _checked(gradient, "gradient", places.shape)
 
     def _gradients(self, places: Floats) -> Floats:
         if self._gradient is not None:
@@ -81,10 +94,17 @@ class CallableField:
 
 def _asked(function: Callable[[Floats], Any], name: str, places: Floats, shape: tuple[int, ...]) -> Floats:
     """What a function says of the places; raises FieldError for what is no answer."""
+    return _checked(_tried(lambda x: np.asarray(function(x), float), name, places), name, shape)
+
+
+def _tried(function: Callable[[Floats], Any], name: str, places: Floats) -> Any:
     try:
-        answer = np.asarray(function(places), float)
+        return function(places)
     except Exception as error:
         raise FieldError(f"the {name} of a CallableField raised {type(error).__name__}: {error}") from error
+
+
+def _checked(answer: Floats, name: str, shape: tuple[int, ...]) -> Floats:
     if answer.shape != shape:
         raise FieldError(f"the {name} of a CallableField must answer with shape {shape}, but gave {answer.shape}")
     if not np.isfinite(answer).all():

@@ -94,6 +94,15 @@ class HasPlanes(Protocol):
         ...
 
 
+@runtime_checkable
+class HasSpread(Protocol):
+    """A field that knows places on its surface."""
+
+    def spread(self, count: int) -> Floats:
+        """About `count` places (n, 3) on the surface, spread evenly; the same at every call."""
+        ...
+
+
 def sampled(field: DistanceField, x: Floats, last: FieldSample | None = None) -> FieldSample:
     """A field at the places x (L, 3), as a FieldSample; raises FieldError where a foreign field answers nonsense.
 
@@ -132,6 +141,9 @@ class Planes:
         """The same planes, with places counted from an origin (3,)."""
         return Planes(self.mean - origin, self.normal, self.thickness, self.width)
 
+    def __len__(self) -> int:
+        return len(self.mean)
+
     def __getitem__(self, rows: slice) -> Planes:
         """Some of them."""
         parts = self.mean, self.normal, self.thickness, self.width
@@ -147,7 +159,24 @@ def planes_near(field: DistanceField, x: Floats, neighbours: int, last: Planes |
     if isinstance(field, HasPlanes):
         return field.planes(x, neighbours, last)
     sample = sampled(field, x)
-    return Planes(sample.foot, np.ascontiguousarray(sample.normal), np.zeros(len(x)), np.full(len(x), np.inf))
+    return exact_planes(sample.foot, sample.normal)
+
+
+def exact_planes(mean: Floats, normal: Floats) -> Planes:
+    """Planes of a surface that is known exactly: no thickness, and no points whose spacing would bound them."""
+    return Planes(mean, np.ascontiguousarray(normal), np.zeros(len(mean)), np.full(len(mean), np.inf))
+
+
+def newton_foot(places: Floats, value: Floats, gradient: Floats) -> Floats:
+    """Where the tangents at the places (L, 3) are zero (L, 3): the feet, also where a field's slope is not one."""
+    slope = np.maximum(np.einsum("li,li->l", gradient, gradient), 1e-12)
+    return np.asarray(places - (value / slope)[:, None] * gradient)
+
+
+def unit(vectors: Floats) -> Floats:
+    """Vectors (..., 3) at length 1; those without a length stay as they are."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.asarray(vectors / np.where(length > 0, length, 1.0))
 
 
 def _from_tuple(field: DistanceField, answer: Any) -> FieldSample:

@@ -28,14 +28,14 @@ def read_stl(path: Path) -> PointCloud:
     """The corners of the triangles, each place once."""
     import trimesh
 
-    _check_whole(path)
+    check_whole_stl(path)
     corners = np.asarray(trimesh.load_mesh(path, process=False).vertices)
     if not len(corners):
         raise CloudFileError("is no STL mesh with triangles")
     return PointCloud(np.unique(corners, axis=0))
 
 
-def _check_whole(path: Path) -> None:
+def check_whole_stl(path: Path) -> None:
     """Raises for a truncated file: trimesh takes an ascii one for empty, and a binary one may claim any size."""
     size = path.stat().st_size
     with path.open("rb") as file:

@@ -47,7 +47,7 @@ def write_npy(path: Path, cloud: PointCloud) -> list[str]:
 
 def read_npz(path: Path, name: str | None = None) -> PointCloud:
     """`points`, `xyz` or the only (N, 3) array, and all that belongs to it; or the array `name` alone."""
-    headers = _check_members(path)
+    headers = checked_members(path)
     with np.load(path, allow_pickle=False) as arrays:
         if name is not None:
             return PointCloud(arrays[_selected(headers, name)])
@@ -76,7 +76,7 @@ def _cloud_of_arrays(columns: dict[str, Array], key: str, viewpoint: Array | Non
     return replace(cloud, attributes={**cloud.attributes, **named})
 
 
-def _check_members(path: Path) -> dict[str, _ArrayHeader]:
+def checked_members(path: Path) -> dict[str, _ArrayHeader]:
     """The headers of all arrays, none of which claims more than its bytes in the file can be."""
     size = path.stat().st_size
     headers = {}

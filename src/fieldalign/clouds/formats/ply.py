@@ -33,22 +33,28 @@ TYPES |= {"float32": "f4", "float64": "f8", "int64": "i8", "uint64": "u8"}
 NAMES = {TYPES[name]: name for name in ("char", "uchar", "short", "ushort", "int", "uint", "float", "double")}
 
 
-class _Property(NamedTuple):
+class Property(NamedTuple):
+    """A column of an element, or a column of lists."""
+
     name: str
     dtype: str
     length: str | None  # the type of a list's length
 
 
-class _Element(NamedTuple):
+class Element(NamedTuple):
+    """Rows of one kind: vertices, faces, or whatever a program needs."""
+
     name: str
     rows: int
-    properties: list[_Property]
+    properties: list[Property]
 
     @property
     def has_lists(self) -> bool:
+        """Whether rows may differ in their length."""
         return any(p.length for p in self.properties)
 
     def dtype(self, order: str) -> np.dtype[np.void]:
+        """Of a row without lists."""
         return np.dtype([(p.name, order + p.dtype) for p in self.properties])
 
     def least_bytes(self, order: str) -> int:
@@ -58,22 +64,31 @@ class _Element(NamedTuple):
         return self.rows * sum(np.dtype(p.length or p.dtype).itemsize for p in self.properties)
 
 
-class _Header(NamedTuple):
+class Header(NamedTuple):
+    """What a file says of itself; `order` is "" where it is text, else that of the bytes."""
+
     order: str
-    elements: list[_Element]
+    elements: list[Element]
     viewpoint: Array | None
 
 
 def read(path: Path) -> PointCloud:
     """The vertices of a PLY file."""
     with path.open("rb") as file:
-        header = _read_header(file)
-        present = path.stat().st_size - file.tell()
-        for element in header.elements:
-            needed = element.least_bytes(header.order) - (not header.order)  # the last line may lack its end
-            require_bytes(needed, present, f"{element.rows} rows of the element {element.name!r}")
-        vertices = _read_vertices(file, header, present)
-    return cloud_from_columns({name: vertices[name] for name in vertices.dtype.names or ()}, header.viewpoint)
+        return read_to_vertices(path, file)[1]
+
+
+def read_to_vertices(path: Path, file: BinaryIO) -> tuple[Header, PointCloud]:
+    """The header and the vertices of a file that is open at its beginning, and stands behind the vertices then."""
+    header = _read_header(file)
+    present = path.stat().st_size - file.tell()
+    for element in header.elements:
+        needed = element.least_bytes(header.order)
+        needed -= not header.order and element.rows > 0  # the last line may lack its end
+        require_bytes(needed, present, f"{element.rows} rows of the element {element.name!r}")
+    vertices = _read_vertices(file, header, present)
+    columns = {name: vertices[name] for name in vertices.dtype.names or ()}
+    return header, cloud_from_columns(columns, header.viewpoint)
 
 
 def write(path: Path, cloud: PointCloud) -> list[str]:
@@ -94,24 +109,24 @@ def write(path: Path, cloud: PointCloud) -> list[str]:
     return left_out
 
 
-def _read_header(file: BinaryIO) -> _Header:
+def _read_header(file: BinaryIO) -> Header:
     if file.readline(8).strip() != b"ply":
         raise CloudFileError("is not a PLY file: its first line is not 'ply'")
-    order, viewpoint, elements = None, None, list[_Element]()
+    order, viewpoint, elements = None, None, list[Element]()
     while line := file.readline(10_000):
         match line.decode("ascii", "replace").split():
             case ["format", encoding, *_] if encoding in ORDERS:
                 order = ORDERS[encoding]
             case ["element", name, count]:
-                elements.append(_Element(name, int(count), []))
+                elements.append(Element(name, int(count), []))
             case ["property", kind, name] if elements and kind in TYPES:
-                elements[-1].properties.append(_Property(name, TYPES[kind], None))
+                elements[-1].properties.append(Property(name, TYPES[kind], None))
             case ["property", "list", length, kind, name] if elements and {length, kind} <= TYPES.keys():
-                elements[-1].properties.append(_Property(name, TYPES[kind], TYPES[length]))
+                elements[-1].properties.append(Property(name, TYPES[kind], TYPES[length]))
             case ["comment", "viewpoint", *numbers] if len(numbers) == 16:
                 viewpoint = np.array(numbers, float).reshape(4, 4)
             case ["end_header"] if order is not None:
-                return _Header(order, elements, viewpoint)
+                return Header(order, elements, viewpoint)
             case [] | ["comment" | "obj_info", *_]:
                 pass
             case words:
@@ -119,36 +134,36 @@ def _read_header(file: BinaryIO) -> _Header:
     raise CloudFileError("is truncated: it ends within its PLY header")
 
 
-def _read_vertices(file: BinaryIO, header: _Header, present: int) -> Array:
+def _read_vertices(file: BinaryIO, header: Header, present: int) -> Array:
     for element in header.elements:
         if element.name == "vertex":
             if element.has_lists:
                 raise CloudFileError("has lists within its vertices, which fieldalign cannot read")
             return (_read_binary if header.order else _read_ascii)(file, element, header.order, present)
-        present -= _skip(file, element, header.order)
+        present -= skip(file, element, header.order, "vertices")
     raise CloudFileError("has no element 'vertex'")
 
 
-def _skip(file: BinaryIO, element: _Element, order: str) -> int:
-    """Skips an element before the vertices; the number of bytes it takes."""
+def skip(file: BinaryIO, element: Element, order: str, wanted: str) -> int:
+    """Skips an element before what is wanted; the number of bytes it takes."""
     start = file.tell()
     if not order:
         for _ in islice(file, element.rows):
             pass
     elif element.has_lists:
-        raise CloudFileError(f"has lists before its vertices (element {element.name!r}), which fieldalign cannot read")
+        raise CloudFileError(f"has lists before its {wanted} (element {element.name!r}), which fieldalign cannot read")
     else:
         file.seek(element.least_bytes(order), 1)
     return file.tell() - start
 
 
-def _read_binary(file: BinaryIO, element: _Element, order: str, present: int) -> Array:
+def _read_binary(file: BinaryIO, element: Element, order: str, present: int) -> Array:
     dtype = element.dtype(order)
     require_bytes(element.rows * dtype.itemsize, present, f"{element.rows} vertices")
     return np.fromfile(file, dtype, element.rows).astype(dtype.newbyteorder("="), copy=False)
 
 
-def _read_ascii(file: BinaryIO, element: _Element, order: str, present: int) -> Array:
+def _read_ascii(file: BinaryIO, element: Element, order: str, present: int) -> Array:
     if not element.rows:
         return np.empty(0, element.dtype(order))
     rows = np.loadtxt(file, element.dtype(order), max_rows=element.rows, comments=None, ndmin=1)
