@@ -3,7 +3,7 @@
 // A pseudo point lies `offset` from its own surface, along the normal n' there. Where it is moved to x, the other surface
 // is the plane (m, n) at x's foot, and the two signed distances should agree: r = N.(x - m) - offset N.n'. N halves n and
 // n', so that a curved surface pulls to neither side (symmetric objective, Rusinkiewicz, SIGGRAPH 2019). The row of the
-// Jacobian for a twist (w, v) on the pose's left is [x cross N, N].
+// Jacobian for a twist (w, v) on the pose's left is [x cross N, N]; for a growth of x by exp(g) it is x.N, the seventh.
 #pragma once
 
 #include <limits>
@@ -44,14 +44,20 @@ inline double weight_of(const Residual& found, double spread, const RobustLoss& 
   return found.cosine * falloff * falloff;
 }
 
-inline Twist row_of(Vec3 place, Vec3 normal) {
+// Of N = 6 freedoms, or of 7 with the growth.
+template <int N>
+std::array<double, N> row_of(Vec3 place, Vec3 normal) {
   const Vec3 moment = cross(place, normal);
-  return {moment.x, moment.y, moment.z, normal.x, normal.y, normal.z};
+  std::array<double, N> row = {moment.x, moment.y, moment.z, normal.x, normal.y, normal.z};
+  if constexpr (N == 7) row[6] = dot(place, normal);
+  return row;
 }
 
 // What one pose's pseudo points add up to for its next step.
+template <int N>
 struct StepSums {
-  NormalEquations equations;  // of H, the upper triangle
+  Square<N> H{};             // sum of weight J^T J, the upper triangle
+  std::array<double, N> g{};  // sum of weight J^T r
   double weights = 0;         // sum of weights
   double squares = 0;         // sum of weight r^2
   double curvature = 0;       // sum of the loss's second derivatives
@@ -60,11 +66,11 @@ struct StepSums {
   void add(Vec3 x, const Residual& found, double spread, const RobustLoss& loss) {
     const double w = weight_of(found, spread, loss) / (spread * spread);
     const double z = found.r / (loss.scale * spread);
-    const Twist row = row_of(x, found.between);
-    for (int a = 0; a < 6; ++a) {
+    const auto row = row_of<N>(x, found.between);
+    for (int a = 0; a < N; ++a) {
       const double weighted = w * row[a];
-      equations.g[a] += weighted * found.r;
-      for (int b = a; b < 6; ++b) equations.H[a][b] += weighted * row[b];
+      g[a] += weighted * found.r;
+      for (int b = a; b < N; ++b) H[a][b] += weighted * row[b];
     }
     weights += w;
     squares += w * found.r * found.r;
@@ -74,28 +80,29 @@ struct StepSums {
 };
 
 // What the residuals at the end tell of the pose's certainty.
-struct CertaintySums {
-  static constexpr int kRun = 16;  // pseudo points: neighbours in space, whose errors may go together
+constexpr int kRun = 16;  // pseudo points: neighbours in space, whose errors may go together
 
-  Square<6> hold{};     // sum of weight J^T J', J of one cloud's planes, J' of the other's
-  Square<6> scatter{};  // of the gradient: sum over runs of g g^T
-  Twist run{};          // g of the run that is not over yet
+template <int N>
+struct CertaintySums {
+  Square<N> hold{};     // sum of weight J^T J', J of one cloud's planes, J' of the other's
+  Square<N> scatter{};  // of the gradient: sum over runs of g g^T
+  std::array<double, N> run{};  // g of the run that is not over yet
   int length = 0;
 
   // The noise of the two clouds' normals is not the same, so that it cancels from the product: a plane, whose normals
   // differ by noise alone, does not hold a pose that slides on it.
   void add(Vec3 x, Vec3 own_normal, Vec3 mean, const Residual& found, double spread, const RobustLoss& loss) {
     const double w = weight_of(found, spread, loss) / (spread * spread);
-    const Twist own = row_of(x, own_normal), other = row_of(mean, found.normal), row = row_of(x, found.between);
-    for (int a = 0; a < 6; ++a) {
+    const auto own = row_of<N>(x, own_normal), other = row_of<N>(mean, found.normal), row = row_of<N>(x, found.between);
+    for (int a = 0; a < N; ++a) {
       run[a] += w * found.r * row[a];
-      for (int b = 0; b < 6; ++b) hold[a][b] += w / 2 * (own[a] * other[b] + other[a] * own[b]);
+      for (int b = 0; b < N; ++b) hold[a][b] += w / 2 * (own[a] * other[b] + other[a] * own[b]);
     }
     if (++length == kRun) end_run();
   }
   void end_run() {
-    for (int a = 0; a < 6; ++a)
-      for (int b = 0; b < 6; ++b) scatter[a][b] += run[a] * run[b];
+    for (int a = 0; a < N; ++a)
+      for (int b = 0; b < N; ++b) scatter[a][b] += run[a] * run[b];
     run = {}, length = 0;
   }
 };

@@ -6,6 +6,7 @@
 
 #include <array>
 
+#include "motion.hpp"
 #include "pair_table.hpp"
 #include "random.hpp"
 
@@ -42,6 +43,7 @@ struct SearchSettings {
   float doubt;          // a pose is dropped when it falls so many standard deviations short of the shortlist
   int keep;             // candidates
   float apart_cosine, apart_distance;  // candidates that differ less are one
+  float drift_cosine, drift_distance;  // a pose that is not allowed stands for one that differs less
   int enough_hits;      // to settle on the best, where
   float distinct;       // the next has less than this share of its score
   float alike;          // all have more than this share of it: to search on would find no better one
@@ -64,6 +66,13 @@ inline float trace_of_difference(const Pose& a, const Pose& b) {
 inline bool lies_within(const Pose& pose, const Confinement& c) {
   const Vec3f shift = pose.moved(c.pivot) - c.guess.moved(c.pivot);
   return (trace_of_difference(pose, c.guess) - 1) / 2 >= c.cosine && dot(shift, shift) <= c.radius * c.radius;
+}
+
+// Whether two poses turn by less than an angle of this cosine against each other, and the pivot lies nearer than this.
+inline bool are_near(const Pose& a, const Pose& b, Vec3f pivot, float cosine, float distance) {
+  if ((trace_of_difference(a, b) - 1) / 2 < cosine) return false;
+  const Vec3f shift = a.moved(pivot) - b.moved(pivot);
+  return dot(shift, shift) < distance * distance;
 }
 
 // The best candidates that differ from each other, best first.
@@ -109,9 +118,7 @@ class Shortlist {
 
  private:
   bool is_same(const Pose& a, const Pose& b) const {
-    if ((trace_of_difference(a, b) - 1) / 2 < settings_.apart_cosine) return false;
-    const Vec3f shift = a.moved(pivot_) - b.moved(pivot_);
-    return dot(shift, shift) < settings_.apart_distance * settings_.apart_distance;
+    return are_near(a, b, pivot_, settings_.apart_cosine, settings_.apart_distance);
   }
 
   SearchSettings settings_;
@@ -205,10 +212,25 @@ struct SearchSpace {
   const PairTable& table;
   std::span<const Plane> drawn, probes;
   std::optional<Confinement> confinement;
+  std::optional<Freedoms> freedoms;
 };
 
+// The allowed pose that a pose stands for, which comes from two pairs and is as rough as their normals; nothing where none
+// is near.
+inline std::optional<Pose> allowed(const Pose& pose, const Freedoms& freedoms, Vec3f pivot, const SearchSettings& s) {
+  Motion motion;
+  std::copy(pose.R.begin(), pose.R.end(), motion.R.begin());
+  motion.t = {pose.t.x, pose.t.y, pose.t.z};
+  motion = freedoms.nearest(motion);
+  Pose nearest;
+  std::transform(motion.R.begin(), motion.R.end(), nearest.R.begin(), [](double v) { return static_cast<float>(v); });
+  nearest.t = {static_cast<float>(motion.t.x), static_cast<float>(motion.t.y), static_cast<float>(motion.t.z)};
+  if (!are_near(pose, nearest, pivot, s.drift_cosine, s.drift_distance)) return {};
+  return nearest;
+}
+
 // Draws one pair, tries the poses that its likes give, offers those that score to the list; how many were tested.
-inline std::uint64_t try_pair(const SearchSpace& space, Random& random, float floor, Shortlist& list,
+inline std::uint64_t try_pair(const SearchSpace& space, Vec3f pivot, Random& random, float floor, Shortlist& list,
                               const SearchSettings& s) {
   const auto any = [&] { return &space.drawn[random.below(static_cast<std::uint32_t>(space.drawn.size()))]; };
   const Plane *a = any(), *b = any();
@@ -220,7 +242,12 @@ inline std::uint64_t try_pair(const SearchSpace& space, Random& random, float fl
   for (std::size_t k = 0; k < tries; ++k) {
     const auto pair = like[tries == like.size() ? k : random.below(static_cast<std::uint32_t>(like.size()))];
     const auto members = space.table.members();
-    const Pose pose = pose_between(*a, *b, members[pair.first], members[pair.second]);
+    Pose pose = pose_between(*a, *b, members[pair.first], members[pair.second]);
+    if (space.freedoms) {
+      const auto nearest = allowed(pose, *space.freedoms, pivot, s);
+      if (!nearest) continue;
+      pose = *nearest;
+    }
     if (space.confinement && !lies_within(pose, *space.confinement)) continue;
     ++tested;
     const auto found = score(space.grid, space.probes, pose, std::max(floor, list.floor()), s);
@@ -244,7 +271,7 @@ inline Found search(const SearchSpace& space, const SearchSettings& s, int threa
     parallel_blocks(blocks, 1, threads, [&](std::size_t block, std::size_t) {
       Random random(s.seed, static_cast<std::uint64_t>(round) << 32 | block);
       for (std::size_t draw = 0; draw < kDraws; ++draw)
-        tests[block] += try_pair(space, random, floor, lists[block], s);
+        tests[block] += try_pair(space, pivot, random, floor, lists[block], s);
     });
     for (std::size_t b = 0; b < blocks; ++b) {
       tested += tests[b];

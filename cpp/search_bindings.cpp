@@ -26,15 +26,6 @@ std::vector<Plane> planes_of(const Points<double>& means, const Points<double>& 
   return planes;
 }
 
-struct Motion {
-  const double* T;  // (4, 4) by rows
-  Vec3 turned(Vec3 p) const {
-    return {T[0] * p.x + T[1] * p.y + T[2] * p.z, T[4] * p.x + T[5] * p.y + T[6] * p.z,
-            T[8] * p.x + T[9] * p.y + T[10] * p.z};
-  }
-  Vec3 moved(Vec3 p) const { return turned(p) + Vec3{T[3], T[7], T[11]}; }
-};
-
 void construct_grid(ClosestGrid* self, Points<double> means, Points<double> normals, double cell, double margin) {
   std::vector<Plane> planes = planes_of(means, normals);
   nb::gil_scoped_release free;
@@ -58,21 +49,18 @@ Pose pose_of(const double* T) {
 
 constexpr std::size_t kTotals = 4;
 
-// H (b, 6, 6), g (b, 6), and for each pose sum of weights, weighted squares, curvature and how many were kept (b, 4).
-nb::tuple arrays_of(const std::vector<StepSums>& sums) {
-  const std::size_t b = sums.size();
-  std::vector<double> H(36 * b), g(6 * b), totals(kTotals * b);
-  for (std::size_t k = 0; k < b; ++k) {
-    const StepSums& s = sums[k];
-    for (int i = 0; i < 6; ++i) {
-      g[6 * k + i] = s.equations.g[i];
-      for (int j = 0; j < 6; ++j) H[36 * k + 6 * i + j] = s.equations.H[std::min(i, j)][std::max(i, j)];
-    }
-    const double row[kTotals] = {s.weights, s.squares, s.curvature, static_cast<double>(s.kept)};
-    std::copy_n(row, kTotals, totals.begin() + static_cast<std::ptrdiff_t>(kTotals * k));
+// H (b, N, N), g (b, N), and for each pose sum of weights, weighted squares, curvature and how many were kept (b, 4).
+template <int N>
+nb::tuple arrays_of(const std::vector<StepSums<N>>& sums) {
+  const std::size_t b = sums.size(), n = N;
+  std::vector<double> H, g, totals;
+  for (const StepSums<N>& s : sums) {
+    g.insert(g.end(), s.g.begin(), s.g.end());
+    for (int i = 0; i < N; ++i)
+      for (int j = 0; j < N; ++j) H.push_back(s.H[std::min(i, j)][std::max(i, j)]);
+    totals.insert(totals.end(), {s.weights, s.squares, s.curvature, static_cast<double>(s.kept)});
   }
-  return nb::make_tuple(array(std::move(H), {b, 6, 6}), array(std::move(g), {b, 6}),
-                        array(std::move(totals), {b, kTotals}));
+  return nb::make_tuple(array(std::move(H), {b, n, n}), array(std::move(g), {b, n}), array(std::move(totals), {b, kTotals}));
 }
 
 // For each pose and each place near the grid's surface: take(pose's row, place's row, place moved, normal moved, plane).
@@ -80,7 +68,7 @@ template <class Take>
 void meet(const ClosestGrid& grid, PointsView<double> places, PointsView<double> normals, Matrices4 poses, int threads,
           Take take) {
   parallel_blocks(poses.shape(0), 1, threads, [&](std::size_t k, std::size_t) {
-    const Motion pose{poses.data() + 16 * k};
+    const Motion pose = motion_of(poses.data() + 16 * k);
     for (std::size_t i = 0; i < places.n; ++i) {
       const Vec3 x = pose.moved(places[i]);
       const Plane& plane = grid.at(narrow(x));
@@ -93,7 +81,7 @@ void meet(const ClosestGrid& grid, PointsView<double> places, PointsView<double>
 nb::tuple grid_sums(const ClosestGrid& grid, Points<double> places, Points<double> normals, Values offsets,
                     Matrices4 poses, double scale, double min_cosine, double reach, int threads) {
   check_lengths(places.shape(0), {normals.shape(0), offsets.shape(0)});
-  std::vector<StepSums> sums(poses.shape(0));
+  std::vector<StepSums<6>> sums(poses.shape(0));
   {
     nb::gil_scoped_release free;
     const RobustLoss loss{scale, min_cosine, reach};
@@ -126,16 +114,18 @@ Array<double> grid_agreement(const ClosestGrid& grid, Points<double> places, Poi
   return array(std::move(shares), {b, 3});
 }
 
-Array<double> array_of(const Square<6>& A) {
+template <std::size_t N>
+Array<double> array_of(const std::array<std::array<double, N>, N>& A) {
   std::vector<double> flat;
-  for (const Twist& row : A) flat.insert(flat.end(), row.begin(), row.end());
-  return array(std::move(flat), {6, 6});
+  for (const auto& row : A) flat.insert(flat.end(), row.begin(), row.end());
+  return array(std::move(flat), {N, N});
 }
 
-// One pose, whose pseudo points are moved already and whose planes are known. The scale of the residuals is their own:
-// three standard deviations, by their median.
+// One pose, whose pseudo points are moved already and whose planes are known; seven freedoms, the last a growth. The scale of the residuals is their own:
+// so many standard deviations, by their median, but no finer than what is given. H, g and totals; hold; scatter; the scale.
 nb::tuple plane_sums(Points<double> x, Points<double> own_normals, Points<double> means, Points<double> normals,
-                     Values spreads, double min_cosine, double reach) {
+                     Values spreads, double min_cosine, double reach, double deviations,
+                     double least_scale) {
   const std::size_t n = x.shape(0);
   check_lengths(n, {own_normals.shape(0), means.shape(0), normals.shape(0), spreads.shape(0)});
   RobustLoss loss{0, min_cosine, reach};
@@ -148,17 +138,17 @@ nb::tuple plane_sums(Points<double> x, Points<double> own_normals, Points<double
   if (!sizes.empty()) {
     const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
     std::nth_element(sizes.begin(), middle, sizes.end());
-    loss.scale = std::max(3 * 1.4826 * *middle, std::numeric_limits<double>::min());
+    loss.scale = std::max(deviations * 1.4826 * *middle, std::max(least_scale, std::numeric_limits<double>::min()));
   }
-  std::vector<StepSums> sums(1);
-  CertaintySums known;
+  std::vector<StepSums<7>> sums(1);
+  CertaintySums<7> known;
   for (std::size_t i = 0; i < n; ++i) {
     if (!found[i]) continue;
     sums[0].add(view(x)[i], *found[i], spreads.data()[i], loss);
     known.add(view(x)[i], view(own_normals)[i], view(means)[i], *found[i], spreads.data()[i], loss);
   }
   known.end_run();
-  return nb::make_tuple(arrays_of(sums), array_of(known.hold), array_of(known.scatter));
+  return nb::make_tuple(arrays_of(sums), array_of(known.hold), array_of(known.scatter), loss.scale);
 }
 
 // Gauss-Newton steps of many poses: the twists (b, 6), and the poses (b, 4, 4) that they lead to.
@@ -227,7 +217,8 @@ Array<double> ranges(const Sight& sight, Points<double> places) {
 // Poses (c, 4, 4), their scores (c,) and how many were tested.
 nb::tuple search_poses(const ClosestGrid& grid, const PairTable& table, Points<double> drawn_means,
                        Points<double> drawn_normals, Points<double> probe_means, Points<double> probe_normals,
-                       std::optional<nb::tuple> confinement, nb::dict settings, int threads) {
+                       std::optional<nb::tuple> confinement, std::optional<nb::tuple> freedoms, nb::dict settings,
+                       int threads) {
   const std::vector<Plane> drawn = planes_of(drawn_means, drawn_normals), probes = planes_of(probe_means, probe_normals);
   if (drawn.empty() || probes.empty()) throw std::invalid_argument("there must be surfels to draw and to probe");
   const auto number = [&](const char* name) { return nb::cast<double>(settings[name]); };
@@ -235,7 +226,8 @@ nb::tuple search_poses(const ClosestGrid& grid, const PairTable& table, Points<d
   const auto real = [&](const char* name) { return static_cast<float>(number(name)); };
   const SearchSettings s{nb::cast<std::uint64_t>(settings["seed"]), whole("rounds"), whole("draws"), whole("matches"),
                          real("tolerance"), real("min_cosine"), real("penalty"), real("doubt"), whole("keep"),
-                         real("apart_cosine"), real("apart_distance"), whole("enough_hits"), real("distinct"), real("alike")};
+                         real("apart_cosine"), real("apart_distance"), real("drift_cosine"), real("drift_distance"),
+                         whole("enough_hits"), real("distinct"), real("alike")};
   std::optional<Confinement> near;
   if (confinement) {
     const auto guess = nb::cast<Matrices4>((*confinement)[0]);
@@ -243,10 +235,18 @@ nb::tuple search_poses(const ClosestGrid& grid, const PairTable& table, Points<d
     near = Confinement{pose_of(guess.data()), narrow({pivot.data()[0], pivot.data()[1], pivot.data()[2]}),
                        nb::cast<float>((*confinement)[2]), nb::cast<float>((*confinement)[3])};
   }
+  std::optional<Freedoms> allowed;
+  if (freedoms) {
+    const auto ends = nb::cast<Matrices4>((*freedoms)[0]);
+    const auto mask = nb::cast<Values>((*freedoms)[2]);
+    allowed = Freedoms{motion_of(ends.data()), motion_of(ends.data() + 16), nb::cast<bool>((*freedoms)[1]), {}, {}};
+    std::copy_n(mask.data(), 3, allowed->turns.begin());
+    std::copy_n(mask.data() + 3, 3, allowed->shifts.begin());
+  }
   Found found;
   {
     nb::gil_scoped_release free;
-    found = search({grid, table, drawn, probes, near}, s, threads);
+    found = search({grid, table, drawn, probes, near, allowed}, s, threads);
   }
   const std::size_t c = found.candidates.size();
   std::vector<double> poses(16 * c, 0.0), scores(c);
@@ -277,10 +277,10 @@ void bind_search(nb::module_& m) {
       .def("__init__", &construct_sight, "points"_a, "eye"_a, "cells"_a)
       .def("ranges", &ranges, "places"_a);
   m.def("search", &search_poses, "grid"_a, "table"_a, "drawn_means"_a, "drawn_normals"_a, "probe_means"_a,
-        "probe_normals"_a, "confinement"_a.none(), "settings"_a, "threads"_a);
+        "probe_normals"_a, "confinement"_a.none(), "freedoms"_a.none(), "settings"_a, "threads"_a);
   m.def("robust_sums", &plane_sums, "x"_a, "own_normals"_a, "means"_a, "normals"_a, "spreads"_a, "min_cosine"_a,
-        "reach"_a);
-  m.attr("RUN") = CertaintySums::kRun;
+        "reach"_a, "deviations"_a, "least_scale"_a);
+  m.attr("RUN") = kRun;
   m.def("coplanar", &coplanar, "places"_a, "normals"_a, "witness_places"_a, "witness_normals"_a, "distance"_a,
         "min_cosine"_a, "threads"_a);
   m.def("take_steps", &take_steps, "poses"_a, "H"_a, "g"_a, "stretch"_a, "largest_turn"_a);

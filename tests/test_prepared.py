@@ -9,7 +9,8 @@ from scipy.spatial import cKDTree
 import fieldalign as fa
 from fieldalign.errors import ArgumentError, CloudFileError
 from fieldalign.fields import PointField
-from fieldalign.prepared import PreparedCloud, prepare, prepare_pair
+from fieldalign.prepare import prepare, prepare_pair
+from fieldalign.prepared import PreparedCloud
 from fieldalign.settings import Settings
 
 
@@ -112,7 +113,7 @@ def test_infinity_is_never_dropped(with_gaps, value, drop):
 
 @pytest.mark.parametrize(
     ("cloud", "word"),
-    [(np.zeros((5, 2)), "shape"), (None, "numbers"), (object(), "numbers"), ([[1, 2, 3], [4]], "rows")],
+    [(np.zeros((5, 4)), "shape"), (None, "numbers"), (object(), "numbers"), ([[1, 2, 3], [4]], "rows")],
 )
 def test_what_is_no_cloud_is_one_clear_error(cloud, word):
     with pytest.raises(ArgumentError, match=f"^cloud must.*{word}"):
@@ -280,7 +281,7 @@ def test_far_outliers_are_no_part_of_the_last_level(corner):
 def test_a_formula_stands_for_itself_and_for_some_places(sphere):
     prepared = prepare(sphere)
     assert prepared.exact is sphere
-    assert len(prepared.fine) == 20_000
+    assert len(prepared.fine) == 30_000
     assert np.allclose(np.linalg.norm(prepared.fine.points - sphere.centre, axis=1), sphere.radius)
 
 

@@ -7,7 +7,7 @@ from scipy.stats import kstest, norm
 
 from fieldalign.errors import ArgumentError
 from fieldalign.fields import PointField
-from fieldalign.pseudo import draw_places, draw_pseudo_points, draw_surface
+from fieldalign.pseudo import draw_pseudo_points, draw_surface
 from fieldalign.settings import Settings
 
 CENTRE = np.array([10.0, -20.0, 30.0])
@@ -142,11 +142,11 @@ def test_keypoints_of_another_field_are_one_clear_error():
 
 
 def test_places_lie_on_the_surface(corner):
-    on_cloud = draw_places(PointField(corner), 500, np.random.default_rng(0))
+    on_cloud, _ = draw_surface(PointField(corner), 500, np.random.default_rng(0))
     distances, rows = cKDTree(corner).query(on_cloud)
     assert distances.max() == 0
     assert len(np.unique(rows)) > 400  # of 500 drawn from 6000
-    on_sphere = draw_places(Sphere(), 500, np.random.default_rng(0))
+    on_sphere, _ = draw_surface(Sphere(), 500, np.random.default_rng(0))
     assert np.allclose(np.linalg.norm(on_sphere - CENTRE, axis=1), 1.5, atol=1e-12)
 
 

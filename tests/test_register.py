@@ -49,8 +49,9 @@ def test_the_guess_is_left_as_it_was(register, corner):
 @pytest.mark.parametrize(
     ("keyword", "value", "word"),
     [
-        ("dof", 4, "dof and scale are not available"),
-        ("scale", True, "dof and scale are not available"),
+        ("dof", 4, "dof must be"),
+        ("dof", "rx roll", "dof must name freedoms among rx, ry"),
+        ("dof", [], "dof must name freedoms"),
         ("seed", -1, "seed must be"),
         ("seed", 1.5, "seed must be"),
         ("seed", "1", "seed must be"),

@@ -152,7 +152,8 @@ def test_few_points_have_none_and_do_not_fail(rng, n):
 
 # ---------------------------------------------------------------------------------------------------------- the table
 
-SETTINGS = {"seed": 1, "rounds": 2, "draws": 64, "matches": 60, "tolerance": 0.05, "min_cosine": 0.95, "penalty": 0.2,
+SETTINGS = {"seed": 1, "drift_cosine": 0.97, "drift_distance": 0.5,
+            "rounds": 2, "draws": 64, "matches": 60, "tolerance": 0.05, "min_cosine": 0.95, "penalty": 0.2,
             "doubt": 1.0, "keep": 10, "apart_cosine": 0.99, "apart_distance": 0.1, "enough_hits": 8, "distinct": 0.6,
             "alike": 0.85}
 
@@ -185,7 +186,7 @@ def test_pairs_are_found_again_after_any_motion_and_turned_normals(rng, any_moti
         T = any_motion(rng, 5.0)
         signs = rng.choice([-1.0, 1.0], (40, 1))
         moved, turned = apply(inverse(T), means), signs * (normals @ T[:3, :3])
-        poses, scores, _ = _core.search(grid, table, moved, turned, moved, turned, None, SETTINGS, 1)
+        poses, scores, _ = _core.search(grid, table, moved, turned, moved, turned, None, None, SETTINGS, 1)
         assert rotation_error(poses[0], T) < 0.01
         assert np.abs(poses[0][:3, 3] - T[:3, 3]).max() < 1e-3
         assert scores[0] == pytest.approx(0.8, abs=0.03)
@@ -201,7 +202,7 @@ def test_a_normals_sign_changes_no_bit(rng):
         table = _core.PairTable(held.places[held.sparse], normals[held.sparse], 6 * VOXEL, 45 * VOXEL, 1)
         rows = moving.sparse
         surfels = moving.places[rows], turned[rows]
-        return _core.search(grid, table, *surfels, *surfels, None, SETTINGS | {"tolerance": VOXEL}, 1)
+        return _core.search(grid, table, *surfels, *surfels, None, None, SETTINGS | {"tolerance": VOXEL}, 1)
 
     plain = found(np.ones(len(held)), np.ones(len(moving)))
     flipped = found(rng.choice([-1.0, 1.0], len(held)), rng.choice([-1.0, 1.0], len(moving)))
@@ -213,6 +214,6 @@ def test_a_normals_sign_changes_no_bit(rng):
 def test_searching_with_nothing_is_refused():
     grid, table = _core.ClosestGrid(np.eye(3), np.eye(3), 1, 1), _core.PairTable(np.eye(3), np.eye(3), 1, 2, 1)
     with pytest.raises(ValueError, match="surfels to draw and to probe"):
-        _core.search(grid, table, np.zeros((0, 3)), np.zeros((0, 3)), np.eye(3), np.eye(3), None, {}, 1)
+        _core.search(grid, table, np.zeros((0, 3)), np.zeros((0, 3)), np.eye(3), np.eye(3), None, None, {}, 1)
     with pytest.raises(ValueError, match="length"):
         _core.PairTable(np.eye(3), np.eye(3)[:2], 1, 2, 1)

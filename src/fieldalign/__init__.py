@@ -6,8 +6,11 @@ from . import fields
 from .clouds.cloud import PointCloud
 from .clouds.files import read_cloud, read_clouds, write_cloud
 from .clouds.thinning import thin
+from .dof import Dof
 from .errors import ArgumentError, CloudFileError, FieldalignError, FieldError, MissingExtraError
-from .prepared import PreparedCloud, prepare
+from .inspection import Deviation, deviation
+from .prepare import prepare
+from .prepared import PreparedCloud
 from .register import register
 from .result import RegistrationResult
 from .settings import PRESETS, Settings
@@ -19,6 +22,8 @@ __all__ = [
     "PRESETS",
     "ArgumentError",
     "CloudFileError",
+    "Deviation",
+    "Dof",
     "Evidence",
     "FieldError",
     "FieldalignError",
@@ -29,6 +34,7 @@ __all__ = [
     "Reason",
     "RegistrationResult",
     "Settings",
+    "deviation",
     "fields",
     "prepare",
     "read_cloud",

@@ -126,18 +126,29 @@ def search(
     probe_means: Floats,
     probe_normals: Floats,
     confinement: tuple[Floats, Floats, float, float] | None,
+    freedoms: tuple[Floats, bool, Floats] | None,
     settings: Mapping[str, float],
     threads: int,
 ) -> tuple[Floats, Floats, int]:
     """Poses (c, 4, 4) that take the probes onto the grid's surface, best first, their scores (c,), and how many were
-    tested. confinement: a guess (1, 4, 4), the pivot (3,), the radius, the cosine of the angle."""
+    tested. confinement: a guess (1, 4, 4), the pivot (3,), the radius, the cosine of the angle. freedoms: what stands
+    left and right of a pose (2, 4, 4) in the motion that is free in part, whether it is inverted, the mask (6,)."""
 
 def robust_sums(
-    x: Floats, own_normals: Floats, means: Floats, normals: Floats, spreads: Floats, min_cosine: float, reach: float
-) -> tuple[tuple[Floats, Floats, Floats], Floats, Floats]:
+    x: Floats,
+    own_normals: Floats,
+    means: Floats,
+    normals: Floats,
+    spreads: Floats,
+    min_cosine: float,
+    reach: float,
+    deviations: float,
+    least_scale: float,
+) -> tuple[tuple[Floats, Floats, Floats], Floats, Floats, float]:
     """As ClosestGrid.robust_sums, of one pose: pseudo points x (n, 3), moved already, their planes (n, 3), and how
-    widely each residual spreads (n,). The scale is three standard deviations of the residuals themselves. Then what
-    holds the pose (6, 6), free of the normals' noise, and the scatter (6, 6) of the gradient."""
+    widely each residual spreads (n,). The scale is so many standard deviations of the residuals themselves, or the
+    least one. The seventh freedom is a growth about the origin. Then what holds the pose (7, 7), free of the normals'
+    noise, the scatter (7, 7) of the gradient, and the scale."""
 
 RUN: int  # neighbouring pseudo points whose gradients are added up before the scatter is taken
 

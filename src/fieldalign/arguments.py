@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .errors import ArgumentError
 
@@ -33,3 +34,14 @@ def check_positive(name: str, value: float) -> None:
     """Raises ArgumentError where the value is not a positive, finite number."""
     if not (is_number(value) and np.isfinite(value) and value > 0):
         raise ArgumentError(f"{name} must be a positive number, but is {value!r}")
+
+
+def as_vector(value: object, name: str) -> NDArray[np.float64]:
+    """A vector (3,) of finite numbers; raises ArgumentError that names the argument for anything else."""
+    try:
+        vector = np.array(value, float)
+    except (TypeError, ValueError) as error:
+        raise ArgumentError(f"{name} must be three numbers, but is {value!r}") from error
+    if vector.shape != (3,) or not np.isfinite(vector).all():
+        raise ArgumentError(f"{name} must be three finite numbers, but is {value!r}")
+    return vector

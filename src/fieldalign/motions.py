@@ -41,10 +41,12 @@ def log_motion(T: Matrix) -> Matrix:
 
 
 def inverse(T: Matrix) -> Matrix:
-    """The inverse of a rigid motion (4, 4)."""
-    inverted = np.eye(4)
-    inverted[:3, :3] = T[:3, :3].T
-    inverted[:3, 3] = -T[:3, :3].T @ T[:3, 3]
+    """The inverse of rigid motions (..., 4, 4)."""
+    back = np.swapaxes(T[..., :3, :3], -1, -2)
+    inverted = np.zeros(T.shape)
+    inverted[..., :3, :3] = back
+    inverted[..., :3, 3] = -np.einsum("...ij,...j->...i", back, T[..., :3, 3])
+    inverted[..., 3, 3] = 1
     return inverted
 
 
@@ -66,6 +68,16 @@ def rotate(R: Matrix, vectors: Matrix) -> Matrix:
     return _core.transform(np.ascontiguousarray(R), np.zeros(3), np.ascontiguousarray(vectors))
 
 
+def growth(factor: float) -> Matrix:
+    """The similarity (4, 4) that multiplies all places by a factor."""
+    return np.diag([factor, factor, factor, 1.0])
+
+
+def size_of(T: Matrix) -> float:
+    """By what a similarity (4, 4) multiplies lengths."""
+    return float(np.cbrt(np.linalg.det(T[:3, :3])))
+
+
 def adjoint(T: Matrix) -> Matrix:
     """Ad (6, 6) of a motion: T Exp(x) T^-1 = Exp(Ad x) for twists x = (w, v)."""
     R, t = T[:3, :3], T[:3, 3]
@@ -75,9 +87,24 @@ def adjoint(T: Matrix) -> Matrix:
     return Ad
 
 
+def seen_from(T: Matrix, scale: float, place: Matrix) -> Matrix:
+    """Twists and growths (7, 7) after a motion x -> scale R x + t, as seen before it, where `place` (3,) is the point
+    that they turn about and grow from."""
+    back = T[:3, :3].T
+    seen = np.zeros((7, 7))
+    seen[:3, :3] = back
+    seen[3:6, :3] = np.cross(place, back, axisb=0, axisc=0)
+    seen[3:6, 3:6] = back / scale
+    seen[3:6, 6] = -place
+    seen[6, 6] = 1
+    return seen
+
+
 def reach_of(twist: Matrix, extent: float) -> float:
-    """How far a twist (6,) moves places of a cloud of this extent about its middle, at most."""
-    return float(np.linalg.norm(twist[:3]) * extent / 2 + np.linalg.norm(twist[3:]))
+    """How far a twist (6,), or a twist and a growth (7,), moves places of a cloud of this extent about its middle, at
+    most."""
+    grows = float(np.abs(twist[6:]).sum())
+    return float((np.linalg.norm(twist[:3]) + grows) * extent / 2 + np.linalg.norm(twist[3:6]))
 
 
 def nearest_rotation(R: Matrix) -> Matrix:
@@ -85,6 +112,55 @@ def nearest_rotation(R: Matrix) -> Matrix:
     U, _, Vt = np.linalg.svd(R)
     U[:, 2] *= np.linalg.det(U) * np.linalg.det(Vt)  # no reflection
     return np.asarray(U @ Vt)
+
+
+def orthonormal(T: Matrix) -> Matrix:
+    """T (4, 4) with the rotation nearest to its upper left part."""
+    rigid = T.copy()
+    rigid[:3, :3] = nearest_rotation(T[:3, :3])
+    return rigid
+
+
+def quaternions_of(R: Matrix) -> Matrix:
+    """Unit quaternions (B, 4), scalar first, of rotations (B, 3, 3)."""
+    xx, yy, zz = R[:, 0, 0], R[:, 1, 1], R[:, 2, 2]
+    squares = np.stack([1 + xx + yy + zz, 1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz], axis=1)
+    x, y, z = R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]
+    yz, zx, xy = R[:, 2, 1] + R[:, 1, 2], R[:, 0, 2] + R[:, 2, 0], R[:, 1, 0] + R[:, 0, 1]
+    a, b, c, d = squares.T
+    products = np.array([[a, x, y, z], [x, b, xy, zx], [y, xy, c, yz], [z, zx, yz, d]])  # 4 q q^T
+    largest = np.argmax(squares, axis=1)
+    q = products[largest, :, np.arange(len(R))]
+    return np.asarray(q / np.linalg.norm(q, axis=1, keepdims=True))
+
+
+def rotations_of(q: Matrix) -> Matrix:
+    """Rotations (B, 3, 3) of unit quaternions (B, 4), scalar first."""
+    w, v = q[:, 0], q[:, 1:]
+    K = np.cross(np.eye(3), v[:, None])  # K x = v cross x
+    stretch = (w**2 - (v**2).sum(axis=1))[:, None, None] * np.eye(3)
+    return np.asarray(stretch + 2 * v[:, :, None] * v[:, None] + 2 * w[:, None, None] * K)
+
+
+def rotation_between(a: Matrix, b: Matrix) -> Matrix:
+    """The smallest rotation (3, 3) that turns the direction of a (3,) into that of b (3,)."""
+    a, b = a / np.linalg.norm(a), b / np.linalg.norm(b)
+    half = a + b
+    if half @ half < 1e-20:  # opposite: half a turn about anything across
+        half = np.cross(a, np.eye(3)[np.argmin(np.abs(a))])
+        half = half / np.linalg.norm(half)
+        return np.asarray(2 * np.outer(half, half) - np.eye(3))
+    K = np.cross(np.eye(3), np.cross(a, b))
+    return np.asarray(np.eye(3) + K + K @ K / (1 + a @ b))
+
+
+def as_similar(T: ArrayLike, name: str) -> Matrix:
+    """T as a similarity (4, 4), float64: a rigid motion of places times a positive factor; raises ArgumentError."""
+    matrix = np.array(T, float)
+    if matrix.shape != (4, 4) or not np.isfinite(matrix).all() or not size_of(matrix) > 0:
+        return as_rigid(T, name)
+    size = size_of(matrix)
+    return as_rigid(matrix @ growth(1 / size), name) @ growth(size)
 
 
 def as_rigid(T: ArrayLike, name: str) -> Matrix:

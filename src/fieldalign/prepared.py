@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Hashable
-from pathlib import Path
-from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from . import _core
 from .alignment.residual import row_dot
-from .clouds.checks import checked_points
-from .clouds.cloud import PointCloud
 from .errors import ArgumentError
-from .fields import DistanceField, FieldSample, PointField, sampled
-from .fields.protocol import Floats, Planes, planes_near
+from .fields import DistanceField, FieldSample, PointField, sampled, spread_over
+from .fields.protocol import Floats, Planes, exact_planes, planes_near
 from .lazy import lazy
-from .pseudo import draw_places, draw_pseudo_points
+from .pseudo import draw_pseudo_points
 from .scale import Scale, scale_of, within
 from .settings import Settings
 from .surface import Surface
@@ -28,8 +22,9 @@ from .verdict.sight import Sight
 _KEPT = 8  # pseudo sets that a prepared cloud remembers
 _FINE = 50_000  # points: more are thinned before the last level of an alignment
 _PSEUDO = 5_000  # pseudo points of the last level: with 10 to 20 neighbours each they see nearly every fine point
+_SINGLE = 100_000  # and against an exact surface
 _FINER = 4.0    # to voxels so much smaller than the search's
-_SURFACE_SAMPLES = 20_000  # places that stand for a field that is no cloud
+_SURFACE_SAMPLES = 30_000  # places that stand for a field that is no cloud
 _PROBES = 200  # surface points that stand for the whole where an overlap is measured
 
 
@@ -38,7 +33,10 @@ class PreparedCloud:
 
     field: its DistanceField. centre: (3,), mean of the points, or middle of the bounds. extent: diagonal of the bounds.
     dropped: how many NaN rows were left out. eye: (3,), where the sensor stood, in the cloud's frame, or None.
+    factor: what its lengths were multiplied by, where its scale is sought.
     """
+
+    factor = 1.0
 
     def __init__(
         self, field: DistanceField, dropped: int = 0, threads: int | None = None, eye: Floats | None = None
@@ -46,10 +44,15 @@ class PreparedCloud:
         self.field = field
         self.dropped = dropped
         self.eye = eye
-        self._threads = resolve_threads(threads)
+        self.threads = resolve_threads(threads)
         self._features: dict[Hashable, tuple[Floats, FieldSample]] = {}
         self._surfaces: dict[int, Surface] = {}
-        self._pseudo: dict[int, Planes] = {}
+        self._pseudo: dict[tuple[int, bool], Planes] = {}
+
+    @property
+    def is_points(self) -> bool:
+        """Whether the surface is known by points alone."""
+        return isinstance(self.field, PointField)
 
     @lazy
     def centre(self) -> Floats:
@@ -68,10 +71,10 @@ class PreparedCloud:
     def probes(self) -> tuple[Floats, float]:
         """Places on the surface (200, 3), and within which distance another cloud's surface counts as the same."""
         rng = np.random.default_rng(0)  # a sample of the cloud itself, alike for every registration
-        places = draw_places(self.field, _PROBES, rng)
         if isinstance(self.field, PointField):
+            places = self.field.drawn(_PROBES, rng)
             return places, 3 * float(np.median(self.field.spacing(places)))
-        return places, 0.0
+        return self.fine.drawn(_PROBES, rng), 0.0
 
     def build(self) -> None:
         """Builds the search tree of all its points, if it has any: the paper's method asks nothing else."""
@@ -82,32 +85,31 @@ class PreparedCloud:
     def fine(self) -> PointField:
         """The surface as points, no denser than the last level of an alignment can use: the cloud's own or thinned."""
         if not isinstance(self.field, PointField):
-            places = draw_places(self.field, _SURFACE_SAMPLES, np.random.default_rng(0))
-            return PointField(places, threads=self._threads)
+            return PointField(spread_over(self.field, _SURFACE_SAMPLES), threads=self.threads)
         points, scale = self.field.points, self._whole_scale
         inside = within(scale.core, points, self.field.bounds)
         if len(inside) > _FINE:
-            bounds, _ = _core.survey(inside, self._threads)
-            inside = _core.thin(inside, bounds, max(scale.voxel / _FINER, scale.finest), self._threads)[0]
-        return self.field if inside is points else PointField(inside, threads=self._threads)
+            bounds, _ = _core.survey(inside, self.threads)
+            inside = _core.thin(inside, bounds, max(scale.voxel / _FINER, scale.finest), self.threads)[0]
+        return self.field if inside is points else PointField(inside, threads=self.threads)
 
     @lazy
     def scale(self) -> Scale:
         """The lengths that the cloud itself suggests."""
-        return self._whole_scale if self.fine is self.field else scale_of(self.fine.points, self._threads)
+        return self._whole_scale if self.fine is self.field else scale_of(self.fine.points, self.threads)
 
     @lazy
     def _whole_scale(self) -> Scale:
         """The scale of all points of a cloud, before any thinning."""
         assert isinstance(self.field, PointField)
-        return scale_of(self.field.points, self._threads)
+        return scale_of(self.field.points, self.threads)
 
     def surface(self, voxel: float) -> Surface:
         """The surfels at about this voxel, kept for the next pair: at the nearest rung of a ladder of quarter octaves
         from the cloud's own voxel."""
         rung = round(4 * float(np.log2(voxel / self.scale.voxel)))
         if rung not in self._surfaces:
-            self._surfaces[rung] = Surface(self.fine.points, self.scale.voxel * 2.0 ** (rung / 4), self._threads)
+            self._surfaces[rung] = Surface(self.fine.points, self.scale.voxel * 2.0 ** (rung / 4), self.threads)
         return self._surfaces[rung]
 
     @property
@@ -120,11 +122,21 @@ class PreparedCloud:
         """How far the sensor saw in each direction, where it is known where it stood."""
         return None if self.eye is None else Sight(np.asarray(self.fine.points, float), self.eye)
 
-    def pseudo_planes(self, neighbours: int) -> Planes:
-        """Pseudo points of the last level: places spread over the surface, and the planes there."""
-        if neighbours not in self._pseudo:
-            self._pseudo[neighbours] = planes_near(self.exact, self.fine.spread(_PSEUDO), neighbours)
-        return self._pseudo[neighbours]
+    def pseudo_planes(self, neighbours: int, single: bool = False) -> Planes:
+        """Pseudo points of the last level: places spread over the surface, and the planes there.
+
+        single: the cloud's own points, each with its own noise, for a last level against an exact surface.
+        """
+        if (neighbours, single) not in self._pseudo:
+            self._pseudo[neighbours, single] = self._drawn_planes(neighbours, single)
+        return self._pseudo[neighbours, single]
+
+    def _drawn_planes(self, neighbours: int, single: bool) -> Planes:
+        if not single:
+            return planes_near(self.exact, self.fine.spread(_PSEUDO), neighbours)
+        assert isinstance(self.field, PointField)
+        points = self.field.spread(_SINGLE)
+        return exact_planes(points, self.fine.surfels(points, neighbours)[1])
 
     def is_copy_of(self, other: PreparedCloud) -> bool:
         """Whether both are the same points but for a motion and the order, as far as two moments tell: of the fine
@@ -156,53 +168,6 @@ class PreparedCloud:
             # A new dictionary, so that calls from several threads never see one change under them.
             self._features = dict([*self._features.items(), (key, known)][-_KEPT:])
         return known
-
-
-CloudLike: TypeAlias = ArrayLike | PointCloud | DistanceField | str | os.PathLike[str] | PreparedCloud
-
-
-def prepare(cloud: CloudLike, *, threads: int | None = None, drop_nonfinite: bool = True) -> PreparedCloud:
-    """A cloud made ready for registration; accepted wherever a cloud is, and worth it where one serves many times.
-
-    cloud: points (N, 3), a PointCloud, a path, a DistanceField, or a prepared cloud, which is returned as it is.
-    threads: None means all cores. drop_nonfinite: NaN rows are missing returns, dropped and counted; infinity raises.
-
-    Raises ArgumentError for points of a wrong shape, with infinity, or fewer than 3 distinct ones, and CloudFileError
-    for a file that cannot be read.
-    """
-    return prepare_named(cloud, "cloud", threads, drop_nonfinite)
-
-
-def prepare_pair(
-    source: CloudLike, target: CloudLike, threads: int, drop_nonfinite: bool
-) -> tuple[PreparedCloud, PreparedCloud]:
-    """prepare() of both clouds of a pair."""
-    return (
-        prepare_named(source, "source", threads, drop_nonfinite),
-        prepare_named(target, "target", threads, drop_nonfinite),
-    )
-
-
-def prepare_named(cloud: CloudLike, name: str, threads: int | None, drop_nonfinite: bool) -> PreparedCloud:
-    """prepare(), with the argument's own name in its errors."""
-    if isinstance(cloud, PreparedCloud):
-        return cloud
-    if isinstance(cloud, DistanceField):
-        return PreparedCloud(cloud, threads=threads)
-    points, eye = _parts_of(cloud)
-    checked = checked_points(points, name, resolve_threads(threads), drop_nonfinite)
-    return PreparedCloud(PointField(checked, threads=threads), checked.dropped, threads, eye)
-
-
-def _parts_of(cloud: Any) -> tuple[Any, Floats | None]:
-    """The points, and the place (3,) of the sensor where the cloud knows it."""
-    if isinstance(cloud, str | Path | os.PathLike):
-        from .clouds.files import read_cloud  # the libraries behind it load only where a file is read
-
-        cloud = read_cloud(cloud)
-    if not isinstance(cloud, PointCloud):
-        return cloud, None
-    return cloud.points, None if cloud.viewpoint is None else np.ascontiguousarray(cloud.viewpoint[:3, 3])
 
 
 def _moments(cloud: PointField) -> Floats:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from .errors import ArgumentError
-from .fields import DistanceField, PointField, sampled
+from .fields import DistanceField, PointField, sampled, spread_over
 from .fields.protocol import Floats
 from .settings import Settings
+
+_CHOICE = 5  # places on a surface for each that is drawn
 
 
 def draw_pseudo_points(target: DistanceField, centre: Floats, settings: Settings, seed: int) -> Floats:
@@ -28,16 +30,12 @@ def draw_pseudo_points(target: DistanceField, centre: Floats, settings: Settings
 
 def draw_surface(field: DistanceField, count: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
     """Places (count, 3) on a field's surface, drawn with replacement, and the unit normals (count, 3) there."""
-    places = draw_places(field, count, rng)
-    return places, field.normals(places) if isinstance(field, PointField) else sampled(field, places).normal
-
-
-def draw_places(field: DistanceField, count: int, rng: np.random.Generator) -> Floats:
-    """Places (count, 3) on a field's surface, with replacement: a cloud's points, else feet of places in its box."""
     if isinstance(field, PointField):
-        return field.drawn(count, rng)
-    low, high = field.bounds
-    return sampled(field, rng.uniform(low, high, (count, 3))).foot
+        places = field.drawn(count, rng)
+        return places, field.normals(places)
+    even = spread_over(field, _CHOICE * count)
+    places = even[rng.integers(0, len(even), count)]
+    return places, sampled(field, places).normal
 
 
 def _keypoints(field: DistanceField) -> Floats:

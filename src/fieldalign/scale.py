@@ -28,13 +28,18 @@ class Scale:
     finest: float
     core: NDArray[np.float64]
 
+    def scaled(self, factor: float) -> Scale:
+        """That of the cloud with all lengths times `factor`."""
+        return Scale(factor * self.voxel, factor * self.finest, factor * self.core)
 
-def scale_of(points: NDArray[Any], threads: int) -> Scale:
-    """The scale of points (N, 3). Cells count that hold two points or more, so that scattered outliers count little."""
+
+def scale_of(points: NDArray[Any], threads: int, cells: int = _CELLS) -> Scale:
+    """The scale of points (N, 3), at which their surface fills so many cells. Cells count that hold two points or more,
+    so that scattered outliers count little."""
     core, edge, shared, company = _core.occupancy(points, _SAMPLE, threads)
     sizes = np.array([edge * 0.5**k for k in range(len(shared))])
     peak = int(np.argmax(shared))
-    voxel = _crossing(shared[: peak + 1], sizes, min(_CELLS, 0.8 * shared[peak]))
+    voxel = _crossing(shared[: peak + 1], sizes, min(cells, 0.8 * shared[peak]))
     finest = _crossing(1 - company, sizes, 0.5)
     # A sample of a surface lies sparser than the points themselves, by the root of its share.
     return Scale(voxel, finest * float(np.sqrt(min(1.0, _SAMPLE / len(points)))), core)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from typing import Any
 
 import numpy as np
@@ -53,6 +54,14 @@ class Surface:
         self.places, self.normals = _where(planar, places), _where(planar, normals)
         self.flatness = np.clip(1 - _where(planar, thickness / np.maximum(width, 1e-300)) ** 2, _LEAST_FLAT, 1)
 
+    def scaled(self, factor: float) -> Surface:
+        """The same surfels with all lengths times `factor`."""
+        other = copy.copy(self)
+        for name in ("extent", "coarse_grid", "fine_grid", "pairs", "middle"):  # lazy ones that have a length
+            other.__dict__.pop(name, None)
+        other.voxel, other.origin, other.places = factor * self.voxel, factor * self.origin, factor * self.places
+        return other
+
     def __len__(self) -> int:
         return len(self.places)
 
@@ -60,6 +69,12 @@ class Surface:
     def extent(self) -> float:
         """The diagonal of the surfels' bounds."""
         return float(np.linalg.norm(np.ptp(self.places, axis=0)))
+
+    @property
+    def size(self) -> float:
+        """How far the surfels lie from their middle, as a root mean square."""
+        away = self.places - np.median(self.places, axis=0)
+        return float(np.sqrt(np.einsum("ni,ni->", away, away) / len(self)))
 
     @lazy
     def middle(self) -> Floats:

@@ -112,7 +112,8 @@ def test_annealing_has_the_same_bits_at_any_number_of_threads(rng):
 def last_level(rng, iterations=30, patience=0.0, neighbours=10):
     held, moving, held_field, moving_field, _ = room()
     planes = planes_near(moving_field, moving_field.spread(3000), neighbours).about(moving.origin)
-    return FieldStage(held_field, held.origin, planes, neighbours, 0.6 * VOXEL, held.extent, iterations, patience)
+    stage = FieldStage(held_field, held.origin, planes, neighbours, 0.6 * VOXEL, held.extent, 3.0)
+    return stage.take(np.inf, iterations, patience)
 
 
 def test_the_last_level_is_far_finer_than_a_voxel(rng):
@@ -185,6 +186,6 @@ def test_a_formula_is_met_to_the_last_digits(rng):
     G = exp_twist(np.r_[0.02 * rng.normal(size=3), 0.01 * rng.normal(size=3)])
     own = planes_near(Box(), places, 10)
     moved = replace(own, mean=apply(inverse(G), own.mean), normal=rotate(inverse(G)[:3, :3], own.normal))
-    stage = FieldStage(Box(), np.zeros(3), moved, 10, 0.3, 2.6, 40, 0)
+    stage = FieldStage(Box(), np.zeros(3), moved, 10, 0.3, 2.6, 3.0).take(np.inf, 40, 0)
     (found,), _ = descend(stage, np.eye(4)[None])
     assert np.abs(found - G).max() < 1e-9

@@ -12,7 +12,7 @@ from fieldalign.alignment import Alignment, Step
 from fieldalign.fields import FieldSample, sampled
 from fieldalign.methods.paper_verdict import MIN_OVERLAP, STILL, certainty, judge, overlaps, rmse
 from fieldalign.motions import apply, exp_twist, inverse, translation
-from fieldalign.prepared import prepare
+from fieldalign.prepare import prepare
 
 
 class Spheres:
@@ -172,7 +172,7 @@ def test_rmse_is_of_the_kept_distances_and_takes_no_side():
 def known(field, T, pseudo, r, weights=None, kept=None):
     n = len(pseudo)
     found = alignment(T=T, kept=kept, weights=weights, n=n)
-    return certainty(sampled(field, apply(inverse(T), pseudo)), pseudo, found, r)
+    return certainty(sampled(field, apply(inverse(T), pseudo)), pseudo, found, r, None, None)
 
 
 @pytest.fixture

@@ -15,7 +15,8 @@ def unit(vectors):
 
 
 def rows_of(places, normals):
-    return np.c_[np.cross(places, normals), normals]
+    """Of a twist, and of a growth about the origin."""
+    return np.c_[np.cross(places, normals), normals, (places * normals).sum(axis=1)]
 
 
 @pytest.fixture
@@ -42,7 +43,7 @@ def kept_of(x, own, means, normals, spreads, min_cosine=0.8, reach=0.5):
 
 
 def test_the_gradients_scatter_is_summed_over_runs_of_those_that_are_kept(planes):
-    *_, scatter = _core.robust_sums(*planes, 0.8, 0.5)
+    *_, scatter, _ = _core.robust_sums(*planes, 0.8, 0.5, 3.0, 0.0)
     x, _, _, _, between, r, w = kept_of(*planes)
     assert len(x) % RUN > 0  # the last run is short
     gradients = (w * r)[:, None] * rows_of(x, between)
@@ -51,14 +52,14 @@ def test_the_gradients_scatter_is_summed_over_runs_of_those_that_are_kept(planes
 
 
 def test_the_hold_is_the_product_of_both_clouds_rows(planes):
-    _, hold, _ = _core.robust_sums(*planes, 0.8, 0.5)
+    _, hold, *_ = _core.robust_sums(*planes, 0.8, 0.5, 3.0, 0.0)
     x, own, means, normals, _, _, w = kept_of(*planes)
     product = (w[:, None] * rows_of(x, own)).T @ rows_of(means, normals)
     assert np.allclose(hold, (product + product.T) / 2, rtol=0, atol=1e-12 * np.abs(hold).max())
 
 
 def test_the_sums_for_a_step_are_those_of_the_same_weights(planes):
-    (H, g, totals), _, _ = _core.robust_sums(*planes, 0.8, 0.5)
+    (H, g, totals), *_ = _core.robust_sums(*planes, 0.8, 0.5, 3.0, 0.0)
     x, _, _, _, between, r, w = kept_of(*planes)
     J = rows_of(x, between)
     assert np.allclose(H[0], (w[:, None] * J).T @ J, rtol=0, atol=1e-12 * np.abs(H).max())
@@ -75,7 +76,8 @@ def test_noise_in_the_normals_of_two_samples_of_a_plane_holds_nothing(seed):
     own = planes_near(one, one.spread(2000), 10)
     partners = planes_near(other, own.mean, 10)
     spreads = np.ones(len(own.mean))
-    (H, _, _), hold, _ = _core.robust_sums(own.mean, own.normal, partners.mean, partners.normal, spreads, 0.8, 0.3)
+    planes = own.mean, own.normal, partners.mean, partners.normal
+    (H, _, _), hold, *_ = _core.robust_sums(*planes, spreads, 0.8, 0.3, 3.0, 0.0)
     slides, up = [3, 4], 5
     assert (np.diag(H[0])[slides] > 5e-3 * H[0, up, up]).all()
     assert (np.abs(np.diag(hold)[slides]) < np.diag(H[0])[slides] / 4).all()
@@ -86,7 +88,7 @@ def test_where_most_residuals_are_zero_the_sums_are_finite():
     """Then the scale is the smallest number there is, and the others are beyond it by more than numbers can say."""
     x = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 1e-17]])
     up = np.tile([0, 0, 1.0], (4, 1))
-    sums, hold, scatter = _core.robust_sums(x, up, x * [1, 1, 0], up, np.ones(4), 0.8, 0.5)
+    sums, hold, scatter, _ = _core.robust_sums(x, up, x * [1, 1, 0], up, np.ones(4), 0.8, 0.5, 3.0, 0.0)
     assert all(np.isfinite(matrix).all() for matrix in (*sums, hold, scatter))
 
 

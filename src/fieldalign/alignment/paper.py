@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..dof import Allowed
 from ..fields import DistanceField, FieldSample, sampled
 from ..fields.protocol import Floats
 from ..motions import apply, exp_twist, inverse, nearest_rotation, translation
@@ -31,9 +32,12 @@ class Alignment:
 class PaperStage:
     """The paper's iteration on one pose G^-1, which takes the target's frame into the source's, both centred."""
 
-    def __init__(self, source: DistanceField, centre: Floats, at_target: FieldSample, P_a: Floats, settings: Settings):
+    def __init__(
+        self, source: DistanceField, centre: Floats, at_target: FieldSample, P_a: Floats, settings: Settings,
+        allowed: Allowed | None = None,
+    ):
         self.source, self.centre, self.at_target, self.P_a, self.settings = source, centre, at_target, P_a, settings
-        self.iterations = settings.max_iterations
+        self.iterations, self.allowed = settings.max_iterations, allowed
         self.weights = np.full(len(P_a), settings.unit**-2)  # 1 in the settings' unit: no other unit changes a bit
         self.at_source: FieldSample | None = None
         self.kept: Mask = np.ones(len(P_a), bool)
@@ -47,9 +51,14 @@ class PaperStage:
         r = residual(self.at_source, self.at_target)                           # eq. (11)
         kept, strict = truncate(self.at_source, self.at_target, G_inv[:3, :3], self.settings)  # Sec. IV-D
         J, r = jacobian(self.at_source, x)[kept], r[kept]                      # eq. (14), (15)
+        if self.allowed is not None:
+            free = self.allowed.twists(poses)[0]
+            J = np.einsum("la,ab->lb", J, free)  # not by a BLAS, whose order of summing may change with its threads
         dx, self.weights[kept] = linear_step(J, r, self.weights[kept], self.settings)  # eq. (16), Sec. IV-C
         self.kept, self.strict = kept, strict
-        return (exp_twist(dx) @ G_inv)[None], Step(dx, float(np.abs(r).mean()), len(r))
+        dx = dx if self.allowed is None else free @ dx
+        poses = (exp_twist(dx) @ G_inv)[None]
+        return poses if self.allowed is None else self.allowed.nearest(poses), Step(dx, float(np.abs(r).mean()), len(r))
 
     def is_still(self, step: Step) -> bool:
         """Whether the increment is smaller than the settings' tolerance."""
@@ -64,16 +73,18 @@ def align(
     T_start: Floats,
     centres: tuple[Floats, Floats],
     settings: Settings,
+    allowed: Allowed | None = None,
 ) -> Alignment:
     """Moves the pseudo points (L, 3) of the target's frame until both fields say the same of them.
 
     target_features is phi(P_tau, P_a), the target's field at `pseudo`; T_start (4, 4) the first guess of
     T_target_source; centres (3,) those of source and target, about which the increments turn.
+    allowed: the poses G^-1 to stay among.
     """
     in_source, in_target = translation(centres[0]), translation(centres[1])
-    stage = PaperStage(source, centres[0], target_features, apply(inverse(in_target), pseudo), settings)
-    start = inverse(inverse(in_target) @ T_start @ in_source)  # G^-1(xi): target -> source, both centred
-    (G_inv,), steps = descend(stage, start[None])
+    stage = PaperStage(source, centres[0], target_features, apply(inverse(in_target), pseudo), settings, allowed)
+    start = inverse(inverse(in_target) @ T_start @ in_source)[None]  # G^-1(xi): target -> source, both centred
+    (G_inv,), steps = descend(stage, start if allowed is None else allowed.nearest(start))
     G_inv[:3, :3] = nearest_rotation(G_inv[:3, :3])
     T = in_target @ inverse(G_inv) @ inverse(in_source)
     assert stage.at_source is not None  # at least one iteration

@@ -11,14 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import _core
+from ..dof import Allowed
 from ..fields.protocol import DistanceField, Floats, Planes, planes_near
 from ..motions import apply, exp_twist, reach_of, rotate
 from ..surface import Surface
 from .agreement import MIN_COSINE, Apart, agreement, best_distinct, both_ways, mutual_score
 from .residual import row_dot
 from .solver import Step, descend
-
-LARGEST_TURN = 0.3    # rad, of a step
+from .steps import LARGEST_TURN, minimisers, take_steps
 
 
 @dataclass(frozen=True)
@@ -38,13 +38,19 @@ _SHARPEST = 0.3       # voxels: no coarse level weighs residuals by less
 _SCORED = 600         # surfels that a pruning goes by
 _LEAST_BEND = 0.6     # of the weights: a step is never so long that it ends as far beyond the end
 _SAME = Apart(0.9986, 1.0)  # 3 degrees and a voxel: poses that came to the same place
+_RESOLUTION = 1e-14   # of coordinates: where surfaces meet without noise, what is left of residuals is rounding
+_LEAST_SHRINKAGE = 0.3  # of the scale, from step to step: residuals that shrink more slowly count on
 _FEW = 30             # runs of pseudo points: too few to tell a scatter
 
 
 class GridStage:
     """One level: pseudo points about the moving surface, all poses at once, against the grid of the held one."""
 
-    def __init__(self, held: Surface, moving: Surface, level: Level, rng: np.random.Generator, threads: int) -> None:
+    def __init__(
+        self, held: Surface, moving: Surface, level: Level, rng: np.random.Generator, threads: int,
+        allowed: Allowed | None = None,
+    ) -> None:
+        self.allowed = allowed
         voxel = max(held.voxel, moving.voxel)
         rows = rng.integers(0, len(moving), level.count)
         self.offsets = rng.normal(0, level.spread * voxel, level.count)
@@ -57,7 +63,7 @@ class GridStage:
     def step(self, poses: Floats) -> tuple[Floats, Step]:
         """A Gauss-Newton step of every pose."""
         H, g, totals = self.grid.robust_sums(self.places, self.normals, self.offsets, poses, *self.loss, self.threads)
-        twists, poses = _core.take_steps(poses, H, g, _stretch(totals), LARGEST_TURN)
+        twists, poses = take_steps(poses, H, g, _stretch(totals), self.allowed)
         return poses, Step(twists[0], _rms(totals[0]), int(totals[0, 3]))
 
     def is_still(self, step: Step) -> bool:
@@ -65,11 +71,14 @@ class GridStage:
         return False
 
 
-def anneal(held: Surface, moving: Surface, poses: Floats, seed: int, threads: int) -> tuple[Floats, Floats]:
+def anneal(
+    held: Surface, moving: Surface, poses: Floats, seed: int, threads: int, allowed: Allowed | None = None
+) -> tuple[Floats, Floats]:
     """The best few of many poses (B, 4, 4), refined level by level, best first, and their scores."""
+    poses = poses if allowed is None else allowed.nearest(poses)
     rng = np.random.default_rng(seed)
     for level in LEVELS:
-        poses, _ = descend(GridStage(held, moving, level, rng, threads), poses)
+        poses, _ = descend(GridStage(held, moving, level, rng, threads, allowed), poses)
         if len(poses) > 1:
             found = agreement(held, moving, poses, threads, rng.integers(0, len(moving), _SCORED)).score
             poses = poses[best_distinct(poses, found, moving.middle, _SAME, moving.voxel, level.keep)]
@@ -79,58 +88,99 @@ def anneal(held: Surface, moving: Surface, poses: Floats, seed: int, threads: in
 
 
 class FieldStage:
-    """The last level: pseudo points on the moving surface itself, one pose, against planes of the exact other field."""
+    """The last level: pseudo points on the moving surface itself, one pose, against planes of the exact other field.
+
+    Beside the pose it knows the growth of what moves: a seventh freedom, where it is asked for.
+    """
 
     def __init__(
-        self,
-        field: DistanceField,
-        centre: Floats,
-        planes: Planes,
-        neighbours: int,
-        reach: float,
-        extent: float,
-        iterations: int,
-        patience: float,
-        allowed: Floats | None = None,
+        self, field: DistanceField, centre: Floats, planes: Planes, neighbours: int, reach: float, extent: float,
+        deviations: float, allowed: Allowed | None = None, grows: bool = False,
     ) -> None:
         """field: the held one, whose place `centre` (3,) is the origin of the poses. planes: the moving cloud's, about
-        its own origin. reach: from a pseudo point to its partner, a length. extent: of the cloud, a length. patience:
-        the stage ends with a step that is smaller than so many standard errors. allowed: basis (6, k) of the twists
-        that steps are made of; None: all."""
+        its own origin. reach: from a pseudo point to its partner, a length. extent: of the cloud, a length.
+        deviations: a residual of so many standard deviations has a quarter of the weight."""
         self.field, self.centre, self.planes, self.neighbours = field, centre, planes, neighbours
-        self.reach, self.extent, self.iterations, self.patience = reach, extent, iterations, patience
-        self.allowed = allowed
-        self.partners: Planes | None = None
-        self.H: Floats = np.zeros((6, 6))
-        self.hold: Floats = np.zeros((6, 6))
-        self.scatter: Floats = np.zeros((6, 6))
+        self.reach, self.extent, self.deviations = reach, extent, deviations
+        self.allowed, self.grows, self.growth = allowed, grows, 1.0
+        self.resolution = _RESOLUTION * (extent + float(np.abs(centre).max()))
+        self.scale = 0.0
+        self.H: Floats = np.zeros((7, 7))
+        self.hold: Floats = np.zeros((7, 7))
+        self.scatter: Floats = np.zeros((7, 7))
         self.totals: Floats = np.zeros(4)
-        self.twist: Floats = np.zeros(6)
+        self.increment: Floats = np.zeros(7)
+        self.take(np.inf, 1, 0.0)
+
+    def take(self, count: float, iterations: int, patience: float) -> FieldStage:
+        """From here on with about `count` of the pseudo points, for so many steps, or until one is smaller than
+        `patience` standard errors."""
+        self.taken = self.planes[:: max(1, round(len(self.planes) / count))]
+        self.iterations, self.patience = iterations, patience
+        self.partners: Planes | None = None
+        return self
 
     def step(self, poses: Floats) -> tuple[Floats, Step]:
         """A Gauss-Newton step; the scale of the weights is that of the residuals themselves."""
         (G,) = poses
-        x, normals = apply(G, self.planes.mean), rotate(G[:3, :3], self.planes.normal)
+        x, normals = self._moved(G), rotate(G[:3, :3], self.taken.normal)
         self.partners = planes_near(self.field, x + self.centre, self.neighbours, self.partners)
-        (H, g, totals), self.hold, self.scatter = _core.robust_sums(
-            x, normals, self.partners.mean - self.centre, self.partners.normal, _spread(self.planes, self.partners),
-            MIN_COSINE, self.reach,
+        # Where most of a surface lies in one plane, that plane alone would set the scale, and hide all else.
+        least_scale = max(self.resolution, _LEAST_SHRINKAGE * self.scale)
+        (H, g, totals), self.hold, self.scatter, self.scale = _core.robust_sums(
+            x, normals, self.partners.mean - self.centre, self.partners.normal, _spread(self.taken, self.partners),
+            MIN_COSINE, self.reach, self.deviations, least_scale,
         )
         self.H, self.totals = H[0], totals[0]
         # Far from the end the scale shrinks with the residuals, and a longer step would leap over the end for ever.
-        turns_back = g[0] @ self.twist > 0
+        turns_back = g[0] @ self.increment > 0
         stretch = np.ones(1) if turns_back else _stretch(totals)
-        if self.allowed is None:
-            (self.twist,), poses = _core.take_steps(poses, H, g, stretch, LARGEST_TURN)
+        self.increment = np.zeros(7)
+        if self.grows:
+            poses = self._grown(poses, H, g, stretch)
         else:
-            within = np.linalg.pinv(self.allowed.T @ H[0] @ self.allowed, hermitian=True)
-            self.twist = -self.allowed @ within @ self.allowed.T @ g[0]
-            poses = (exp_twist(self.twist) @ G)[None]
-        return poses, Step(self.twist, self.rmse, int(self.totals[3]))
+            (self.increment[:6],), poses = take_steps(poses, H[:, :6, :6], g[:, :6], stretch, self.allowed)
+        return poses, Step(self.increment[: 6 + self.grows], self.rmse, int(self.totals[3]))
+
+    def basis(self, poses: Floats) -> Floats:
+        """What the pose may do, in columns (7, m): twists on its left, and the growth about the centre of the dof."""
+        basis = np.eye(7)[:, : 6 + self.grows]
+        if self.allowed is None:
+            return basis
+        allowed = self.allowed.grown(self.growth) if self.grows else self.allowed
+        basis[:6, :6] = allowed.twists(poses)[0]
+        if self.grows:
+            basis[3:6, 6] = -allowed.centres(poses)[0]
+        return basis
+
+    def _grown(self, poses: Floats, H: Floats, g: Floats, stretch: Floats) -> Floats:
+        """The poses (1, 4, 4) after a step of seven freedoms; what moves has grown by the seventh."""
+        (step,) = minimisers(H, g, self.basis(poses)[None]) * stretch[:, None]
+        self.increment = step * min(1, LARGEST_TURN / max(float(np.linalg.norm(step[:3])), abs(step[6]), LARGEST_TURN))
+        moved = exp_twist(self.increment[:6]) @ poses[0]
+        growth = float(np.exp(self.increment[6]))
+        # The growth is about the origin of the poses; the twist undoes what it moves of the centre.
+        moved[:3, 3] *= growth
+        self.growth *= growth
+        poses = np.asarray(moved[None])
+        return poses if self.allowed is None else self.allowed.grown(self.growth).nearest(poses)
+
+    def _moved(self, G: Floats) -> Floats:
+        return apply(G, self.taken.mean if self.growth == 1 else self.growth * self.taken.mean)
+
+    def misfit(self, G: Floats, within: float) -> float:
+        """The mean squared residual over the square of a length, 0 to 1: 1 of pseudo points further off, and of those
+        whose normals do not agree."""
+        x, normals = self._moved(G), rotate(G[:3, :3], self.taken.normal)
+        partners = planes_near(self.field, x + self.centre, self.neighbours)
+        away = x + self.centre - partners.mean
+        is_on = (row_dot(away, away) <= self.reach**2) & (np.abs(row_dot(normals, partners.normal)) >= MIN_COSINE)
+        squares = np.minimum((row_dot(away, partners.normal) / within) ** 2, 1)
+        return float(np.where(is_on, squares, 1.0).mean())
 
     def overlap(self, G: Floats) -> Floats:
         """Centroid (3,) of the pseudo points that have a partner; of all where none has."""
-        x = apply(G, self.planes.mean)
+        x = self._moved(G)
         assert self.partners is not None
         away = x - (self.partners.mean - self.centre)
         near = row_dot(away, away) < self.reach**2
@@ -138,12 +188,12 @@ class FieldStage:
 
     @property
     def curvature(self) -> Floats:
-        """Derivative (6, 6) of the gradient by a twist: H, less what the loss bends."""
+        """Derivative (7, 7) of the gradient by a twist and a growth: H, less what the loss bends."""
         return np.asarray(self.H / _stretch(self.totals[None]))
 
     @property
     def gradient_scatter(self) -> Floats:
-        """Covariance (6, 6) of the gradient: from runs of neighbouring pseudo points, and where these are few, from the
+        """Covariance (7, 7) of the gradient: from runs of neighbouring pseudo points, and where these are few, from the
         residuals as if each were independent."""
         runs = self.totals[3] / _core.RUN
         independent = (self.rmse**2 + (1e-12 * self.extent) ** 2) / _stretch(self.totals[None]) ** 2 * self.H
@@ -153,7 +203,7 @@ class FieldStage:
     def roughness(self) -> float:
         """Thickness of the planes over their width, root mean square of both clouds' medians."""
         assert self.partners is not None
-        ratios = [np.median(p.thickness / np.maximum(p.width, 1e-300)) for p in (self.planes, self.partners)]
+        ratios = [np.median(p.thickness / np.maximum(p.width, 1e-300)) for p in (self.taken, self.partners)]
         return float(np.sqrt((ratios[0] ** 2 + ratios[1] ** 2) / 2))
 
     @property

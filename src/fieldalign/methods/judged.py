@@ -10,26 +10,44 @@ from ..alignment.agreement import Agreement, Apart, both_ways, mutual_score
 from ..fields.protocol import Floats
 from ..motions import apply, inverse, reach_of
 from ..result import RegistrationResult
-from ..verdict import Evidence, freedoms
+from ..verdict import MIN_MARGIN, Evidence, freedoms
 from .pair import Pair
-from .refined import Refined, certainty
+from .refined import Refined, certainty, sketch
 
 CLEARLY_OTHER = Apart(0.966, 5.0)  # 15 degrees, or voxels
 RIVAL = 0.9               # of the best score: a pose that the data cannot tell from it
 
 
+_FINE_RIVALS = 3          # that are compared at the scale of the noise, where surfaces are known exactly
+
+
 @dataclass(frozen=True, eq=False)
 class Contest:
-    """The poses (B, 4, 4) that a pose is compared with, and their scores (B,); whether all poses were searched."""
+    """The poses (B, 4, 4) that a pose is compared with, and their scores (B,); whether all poses were searched; the
+    best score of a clearly different scale."""
 
     poses: Floats
     scores: Floats
     searched: bool
+    other_scale: float = 0.0
 
     def margin(self, G: Floats, score: float, pair: Pair) -> float:
         """By what factor a score is better than that of the best clearly different pose."""
         others = self.scores[CLEARLY_OTHER.differ(self.poses, G, pair.middle, pair.voxel)]
-        return score / max(float(others.max(initial=0.0)), 1e-12)
+        return score / max(float(others.max(initial=self.other_scale)), 1e-12)
+
+
+    def at_the_noise(self, refined: Refined, pair: Pair) -> float:
+        """By what factor the squared residuals are smaller, seen at the scale of the noise, than in the best clearly
+        different poses, refined. A smooth part agrees coarsely with itself in many poses, but exactly in one."""
+        within = refined.last.scale / 2
+        other = 1.0
+        is_other = CLEARLY_OTHER.differ(self.poses, refined.G, pair.middle, pair.voxel)
+        for G in self.poses[is_other][np.argsort(-self.scores[is_other], kind="stable")][:_FINE_RIVALS]:
+            rival = sketch(pair, G)
+            if CLEARLY_OTHER.differ(rival.G[None], refined.G, pair.middle, pair.voxel)[0]:
+                other = min(other, rival.last.misfit(rival.G, within))
+        return other / max(refined.last.misfit(refined.G, within), 1e-12)
 
 
 def judged(pair: Pair, refined: list[Refined], contest: Contest, threads: int) -> list[RegistrationResult]:
@@ -41,7 +59,9 @@ def judged(pair: Pair, refined: list[Refined], contest: Contest, threads: int) -
     poses = np.stack([r.G for r in refined])
     there, back = both_ways(held, moving, poses, threads)
     scores = mutual_score(there, back)
-    all_of_them = Contest(np.concatenate([poses, contest.poses]), np.r_[scores, contest.scores], contest.searched)
+    all_of_them = replace(
+        contest, poses=np.concatenate([poses, contest.poses]), scores=np.r_[scores, contest.scores]
+    )
     order = [k for k in np.argsort(-scores, kind="stable") if scores[k] >= RIVAL * scores.max()]
     return [_result(pair, refined[k], (there.of(k), back.of(k)), all_of_them) for k in order]
 
@@ -52,10 +72,13 @@ def _result(
     """What is known of one pose; ways: how the moving surface lies on the held one, and the other way."""
     T, last, (there, back) = pair.motion(refined.G), refined.last, ways
     known, _ = certainty(pair, refined)
+    margin = contest.margin(refined.G, float(mutual_score(there, back)[0]), pair)
+    if margin < MIN_MARGIN and not pair.held.is_points and last.scale > 0:
+        margin = max(margin, contest.at_the_noise(refined, pair))
     evidence = Evidence(
         met=float(max(there.met[0], back.met[0])),
         agreeing=float(np.sqrt(there.purity * back.purity)[0]),
-        margin=contest.margin(refined.G, float(mutual_score(there, back)[0]), pair),
+        margin=margin,
         searched=contest.searched,
         seen_through=_seen_through(pair, T),
         hold=float(known.hold[0]),
@@ -64,7 +87,7 @@ def _result(
     reason = evidence.reason
     on_source, on_target = (there, back) if pair.is_swapped else (back, there)
     return RegistrationResult(
-        T_target_source=T,
+        T_target_source=pair.similarity(refined.G, last.growth) if pair.grows else T,
         accepted=reason.accepts,
         reason=reason,
         overlap=float(on_source.on[0]),

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..fields.protocol import Floats
-from ..motions import inverse, translation
+import numpy as np
+
+from ..dof import Allowed, Dof, allowed_poses
+from ..fields.protocol import Floats, Planes
+from ..lazy import lazy
+from ..motions import apply, growth, inverse, size_of, translation
 from ..prepared import PreparedCloud
 from ..surface import Surface
 
@@ -16,15 +20,23 @@ class Pair:
 
     As in the paper, the source is held and the target's pseudo points move, so G is the inverse of T_target_source;
     unless the source is much smaller: a small cloud's points all find partners in a large one, not the other way round.
+    Of points and a field that knows its surface exactly (a mesh, a volume), the points move: their own distances are 0.
     """
 
     source: PreparedCloud
     target: PreparedCloud
     voxel: float
+    dof: Dof | None = None
+    guess: Floats | None = None  # of T_target_source; from it the dof's motions are counted, None: from the identity
+    grows: bool = False          # whether the scale is sought, too
 
     @property
     def is_swapped(self) -> bool:
         """Whether the target is held."""
+        if self.grows and self.dof is not None:
+            return True  # so that what grows is the source, about the centre in the target
+        if self.source.is_points != self.target.is_points:
+            return self.source.is_points
         return len(self.source.surface(self.voxel)) < 0.5 * len(self.target.surface(self.voxel))
 
     @property
@@ -41,19 +53,62 @@ class Pair:
         """Of the held and of the moving cloud."""
         return self.held.surface(self.voxel), self.moving.surface(self.voxel)
 
+    def pseudo_planes(self, neighbours: int) -> Planes:
+        """The pseudo points of the last level, on the moving surface, and the planes there."""
+        return self.moving.pseudo_planes(neighbours, single=self.moving.is_points and not self.held.is_points)
+
+    @lazy
+    def allowed(self) -> Allowed | None:
+        """The poses that the dof allows; None: all."""
+        if self.dof is None:
+            return None
+        held, moving = self.surfaces()
+        return allowed_poses(self.dof, self.rigid_guess, held.origin, moving.origin, self.is_swapped)
+
     @property
     def middle(self) -> Floats:
         """Of the moving surface (3,), about its origin."""
         return self.surfaces()[1].middle
 
     def motion(self, G: Floats) -> Floats:
-        """T_target_source of a pose between the surfaces' origins."""
+        """The rigid motion from the source, as large as it is in this pair, to the target, of a pose between the
+        surfaces' origins."""
         held, moving = self.surfaces()
         whole = translation(held.origin) @ G @ translation(-moving.origin)
         return whole if self.is_swapped else inverse(whole)
 
-    def pose(self, T_target_source: Floats) -> Floats:
-        """The pose between the surfaces' origins of a T_target_source."""
+    def pose(self, motion: Floats) -> Floats:
+        """The pose between the surfaces' origins of a motion from source to target."""
         held, moving = self.surfaces()
-        whole = T_target_source if self.is_swapped else inverse(T_target_source)
+        whole = motion if self.is_swapped else inverse(motion)
         return translation(-held.origin) @ whole @ translation(moving.origin)
+
+    def similarity(self, G: Floats, grown: float) -> Floats:
+        """T_target_source of the source as it came, where what moves has grown by a factor, too."""
+        held, moving = self.surfaces()
+        to_held, from_moving = translation(held.origin), translation(-moving.origin)
+        if self.is_swapped:
+            whole = to_held @ G @ growth(grown) @ from_moving
+        else:
+            whole = inverse(from_moving) @ growth(1 / grown) @ inverse(G) @ inverse(to_held)
+        return whole @ growth(self.source.factor)
+
+    @property
+    def guessed_pose(self) -> Floats | None:
+        """The guess between the surfaces' origins."""
+        return None if self.guess is None else self.pose(self.rigid_guess)
+
+    @lazy
+    def rigid_guess(self) -> Floats:
+        """The guess, or the identity, as a motion of the source as large as it is in this pair: it turns as the guess
+        does, and takes the centre of the dof, or of the source, to where the guess takes it."""
+        guess = np.eye(4) if self.guess is None else self.guess
+        if not self.grows:
+            return guess
+        size = size_of(guess)
+        rigid = guess @ growth(1 / size)
+        centre = self.source.centre / self.source.factor
+        if self.dof is not None:
+            centre = apply(inverse(rigid), self.dof.frame[None, :3, 3])[0] / size
+        rigid[:3, 3] += rigid[:3, :3] @ ((size - self.source.factor) * centre)
+        return rigid

@@ -5,6 +5,7 @@ from __future__ import annotations
 from ..alignment import align
 from ..alignment.residual import residual
 from ..clock import Clock
+from ..dof import Dof, allowed_poses
 from ..fields import sampled
 from ..fields.protocol import Floats
 from ..motions import apply, inverse, translation
@@ -24,6 +25,7 @@ def register_by_paper(
     seed: int,
     threads: int,
     clock: Clock,
+    dof: Dof | None = None,
 ) -> RegistrationResult:
     """Yuan & Nüchter, RA-L 2022, from init (4, 4), or from the centroids laid on each other."""
     side_by_side(threads, source.build, target.build)
@@ -32,10 +34,11 @@ def register_by_paper(
     clock.lap("pseudo points")
     T_start = translation(target.centre - source.centre) if init is None else init
     field = source.sampled_by(settings, threads)
-    found = align(field, target_features, pseudo, T_start, (source.centre, target.centre), settings)
+    allowed = None if dof is None else allowed_poses(dof, init, source.centre, target.centre, target_is_held=False)
+    found = align(field, target_features, pseudo, T_start, (source.centre, target.centre), settings, allowed)
     clock.lap("align")
     at_source = sampled(field, apply(inverse(found.T_target_source), pseudo), found.at_source)
-    known = certainty(at_source, pseudo, found, residual(at_source, target_features))
+    known = certainty(at_source, pseudo, found, residual(at_source, target_features), dof, init)
     overlap, overlap_target = overlaps(source, target, found.T_target_source)
     reason = judge(found, source, (overlap, overlap_target))
     clock.lap("judge")

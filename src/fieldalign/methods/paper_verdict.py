@@ -7,9 +7,10 @@ import numpy as np
 from .. import _core
 from ..alignment import Alignment
 from ..alignment.residual import feature_gradient, row_dot
+from ..dof import Dof, allowed_poses
 from ..fields import FieldSample, sampled
 from ..fields.protocol import Floats
-from ..motions import apply, inverse, reach_of, rotate
+from ..motions import apply, inverse, reach_of, rotate, translation
 from ..prepared import PreparedCloud
 from ..verdict import Certainty, Reason, split
 
@@ -44,7 +45,9 @@ def rmse(at_source: FieldSample, at_target: FieldSample, alignment: Alignment) -
     return float(np.sqrt(np.mean(off**2)))
 
 
-def certainty(at_source: FieldSample, pseudo: Floats, alignment: Alignment, r: Floats) -> Certainty:
+def certainty(
+    at_source: FieldSample, pseudo: Floats, alignment: Alignment, r: Floats, dof: Dof | None, guess: Floats | None
+) -> Certainty:
     """Information of a left perturbation (w, v) in the target frame, from the residuals' own spread.
 
     Gauss-Newton's J^T W J / s^2 over the kept pseudo points, s^2 = sum w r^2 / (n - 6), as if they were independent.
@@ -63,4 +66,8 @@ def certainty(at_source: FieldSample, pseudo: Floats, alignment: Alignment, r: F
     variance = max(float((w * r[kept] ** 2).sum()) / freedom, w.mean() * (1e-12 * scale) ** 2)
     information = _core.information(J, w) / variance
     length = float(np.sqrt(row_dot(places, places).mean()))
-    return split(information, information, information, reference, length, 1e-9)
+    free = None
+    if dof is not None:
+        allowed = allowed_poses(dof, guess, reference, np.zeros(3), target_is_held=True)
+        free = allowed.twists(translation(-reference) @ alignment.T_target_source[None])[0]
+    return split(information, information, information, reference, length, 1e-9, free)

@@ -19,31 +19,36 @@ from ..alignment.agreement import best_distinct
 from ..alignment.residual import row_dot
 from ..alignment.robust import anneal
 from ..clock import Clock
+from ..dof import Dof
 from ..fields.protocol import Floats
 from ..motions import apply, exp_twist, translation
 from ..prepared import PreparedCloud
 from ..result import RegistrationResult
 from ..scale import common_voxel
-from ..search import Confinement, search
+from ..search import ROUNDS, Confinement, search
 from ..surface import main_axes
 from ..threads import side_by_side
 from .judged import CLEARLY_OTHER, RIVAL, Contest, judged
 from .pair import Pair
-from .refined import Refined, at_copies, last_level, left_at, refine
+from .refined import Refined, at_copies, at_its_size, last_level, left_at, refine
 
 _MOST_RIVALS = 4            # poses that the last level sees
-_AROUND, _STRAY = 8, 0.1   # poses tried around a guess; how far they are shifted, of the extent
+_AROUND, _AROUND_FREE = 8, 24  # poses tried around a guess; where a dof leaves few others
+_STRAY = 0.1                # of the extent: how far they are shifted
 
 
 @dataclass(frozen=True, eq=False)
 class Start:
     """init: (4, 4), a guess of T_target_source, or None. searches: whether poses are searched for, within `radius` (the
-    clouds' unit) and `angle` (rad) of the guess where there is one."""
+    clouds' unit) and `angle` (rad) of the guess where there is one. dof: what is free, counted from the guess, or None:
+    all. grows: whether the scale is free, too."""
 
     init: Floats | None
     searches: bool
     radius: float = np.inf
     angle: float = np.pi
+    dof: Dof | None = None
+    grows: bool = False
 
     @property
     def searches_everywhere(self) -> bool:
@@ -51,23 +56,25 @@ class Start:
         return self.searches and (self.init is None or bool(np.isinf(self.radius) and self.angle == np.pi))
 
 
-_ANYWHERE = Start(None, searches=True)
-
 
 def register_robust(
-    source: PreparedCloud, target: PreparedCloud, start: Start, seed: int, threads: int, clock: Clock
+    source: PreparedCloud, target: PreparedCloud, start: Start, seed: int, threads: int, clock: Clock,
+    other_scale: float = 0.0,
 ) -> RegistrationResult:
-    """From any pose, or from a guess, to a result."""
-    pair = _prepared_pair(source, target, start.searches, threads, clock)
+    """From any pose, or from a guess, to a result. other_scale: the best score of a clearly different scale."""
+    pair = _prepared_pair(source, target, start, threads, clock)
     held, moving = pair.surfaces()
-    guess = None if start.init is None else pair.pose(start.init)
-    poses = _starting_poses(pair, start, guess, seed, threads)
+    guess = pair.guessed_pose
+    poses = starting_poses(pair, start, seed, threads)
     clock.lap("search")
-    poses, scores = anneal(held, moving, poses, seed, threads)
+    poses, scores = anneal(held, moving, poses, seed, threads, pair.allowed)
     contest = _contest(pair, poses, scores, guess, start.searches_everywhere, seed, threads)
+    contest = replace(contest, other_scale=other_scale)
     clock.lap("anneal")
     refined = [at_copies(pair, refine(pair, G)) for G in _rivals(pair, poses, scores)]
-    if start.init is not None:
+    if pair.grows:
+        pair, refined = at_its_size(pair, refined)
+    elif start.init is not None:
         refined = [left_at(start.init, pair, r) for r in refined]
     clock.lap("refine")
     best, *others = judged(pair, refined, contest, threads)
@@ -76,15 +83,17 @@ def register_robust(
 
 
 def verify_robust(
-    source: PreparedCloud, target: PreparedCloud, T: Floats, searches: bool, seed: int, threads: int, clock: Clock
+    source: PreparedCloud, target: PreparedCloud, T: Floats, searches: bool, seed: int, threads: int, clock: Clock,
+    dof: Dof | None = None,
 ) -> RegistrationResult:
     """The verdict on a pose T_target_source (4, 4) as it is; other poses are searched for, or only tried around it."""
-    pair = _prepared_pair(source, target, searches, threads, clock)
+    start = Start(None, searches, dof=dof)
+    pair = _prepared_pair(source, target, start, threads, clock)
     held, moving = pair.surfaces()
     G = pair.pose(T)
     poses, scores = np.empty((0, 4, 4)), np.empty(0)
     if searches:
-        poses, scores = anneal(held, moving, _starting_poses(pair, _ANYWHERE, None, seed, threads), seed, threads)
+        poses, scores = anneal(held, moving, starting_poses(pair, start, seed, threads), seed, threads, pair.allowed)
     clock.lap("search")
     contest = _contest(pair, poses, scores, G, searches, seed, threads)
     clock.lap("anneal")
@@ -96,11 +105,11 @@ def verify_robust(
 
 
 def _prepared_pair(
-    source: PreparedCloud, target: PreparedCloud, searches: bool, threads: int, clock: Clock
+    source: PreparedCloud, target: PreparedCloud, start: Start, threads: int, clock: Clock
 ) -> Pair:
     """Both clouds at one scale, with all that the search and the alignment look up."""
     scales = side_by_side(threads, lambda: source.scale, lambda: target.scale)
-    pair = Pair(source, target, common_voxel(*scales))
+    pair = Pair(source, target, common_voxel(*scales), start.dof, start.init, start.grows)
     clock.lap("scale")
     side_by_side(threads, lambda: source.surface(pair.voxel), lambda: target.surface(pair.voxel))
     clock.lap("surfels")
@@ -108,7 +117,7 @@ def _prepared_pair(
     side_by_side(
         threads,
         lambda: held.fine_grid,
-        lambda: searches and held.pairs,
+        lambda: start.searches and held.pairs,
         lambda: (held.coarse_grid, held.weights),
         lambda: (moving.coarse_grid, moving.weights),
     )
@@ -116,13 +125,14 @@ def _prepared_pair(
     return pair
 
 
-def _starting_poses(pair: Pair, start: Start, guess: Floats | None, seed: int, threads: int) -> Floats:
+def starting_poses(pair: Pair, start: Start, seed: int, threads: int, rounds: int = ROUNDS) -> Floats:
     """Poses (B, 4, 4) to anneal: the guess and what the search found; without either, the main axes on each other."""
     held, moving = pair.surfaces()
+    guess = pair.guessed_pose
     poses = [] if guess is None else [guess]
     if start.searches:
         within = None if guess is None else Confinement(guess, start.radius, start.angle)
-        poses.extend(search(held, moving, seed, threads, within)[0])
+        poses.extend(search(held, moving, seed, threads, within, pair.allowed, rounds)[0])
     return np.stack(poses or main_axes(held, moving))
 
 
@@ -131,18 +141,21 @@ def _contest(
 ) -> Contest:
     """The poses that a pose is measured by: those found, and where none of these is clearly another, some around the
     guess."""
-    found_others = len(poses) and CLEARLY_OTHER.differ(poses, poses[0], pair.middle, pair.voxel).any()
-    if guess is not None and not found_others:
-        around = anneal(*pair.surfaces(), _around(guess, pair, seed), seed, threads)
+    found_others = bool(len(poses)) and CLEARLY_OTHER.differ(poses, poses[0], pair.middle, pair.voxel).any()
+    centre, count = guess, _AROUND
+    if pair.allowed is not None:  # where little is free, the allowed poses are too few to tell what chance brings about
+        centre, count, found_others = poses[0] if len(poses) else guess, _AROUND_FREE, False
+    if centre is not None and not found_others:
+        around = anneal(*pair.surfaces(), _around(centre, pair, count, seed), seed, threads)
         poses, scores = np.concatenate([poses, around[0]]), np.r_[scores, around[1]]
     return Contest(poses, scores, searched)
 
 
-def _around(guess: Floats, pair: Pair, seed: int) -> Floats:
+def _around(guess: Floats, pair: Pair, count: int, seed: int) -> Floats:
     """Poses (B, 4, 4) anywhere around a guess: turned about the middle of what moves, and shifted."""
     rng = np.random.default_rng(seed)
-    axes, shifts = rng.normal(size=(2, _AROUND, 3))
-    axes *= (rng.uniform(0.3, np.pi, _AROUND) / np.sqrt(row_dot(axes, axes)))[:, None]
+    axes, shifts = rng.normal(size=(2, count, 3))
+    axes *= (rng.uniform(0.3, np.pi, count) / np.sqrt(row_dot(axes, axes)))[:, None]
     middle = apply(guess, pair.middle[None])[0]
     shifts *= _STRAY * pair.surfaces()[1].extent
     from_middle = translation(-middle) @ guess
