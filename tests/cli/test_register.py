@@ -348,3 +348,42 @@ def test_what_a_format_cannot_hold_is_told(call):
     status, _, err = call("register", "source.ply", "target.npy", "--output", "moved.npy")
     assert status == 0
     assert err.startswith("Warning: moved.npy: .npy files have no place for")
+
+
+# ---------------------------------------------------------------------------------------------------- freedoms and scale
+
+
+def test_what_is_not_free_stays(call, scans):
+    """The truth turns about z and shifts."""
+    _, out, _ = call("register", "source.ply", "target.npy", "--dof", "levelled")
+    assert np.allclose(pose_of(out), scans[1], atol=1e-6)
+    assert np.array_equal(pose_of(out)[2, :3], [0, 0, 1])
+    about = "--dof-axis", "0,0,2", "--dof-centre", "1 2 0"
+    _, out, _ = call("register", "source.ply", "target.npy", "--dof", "rz z", *about)
+    turned = pose_of(out)
+    assert np.allclose(apply(turned, np.array([[1.0, 2, 0]]))[0, :2], [1, 2], atol=1e-6)
+
+
+def test_another_unit_is_found(call, scans):
+    folder, T = scans
+    np.save(folder / "millimetres.npy", 1000 * fa.read_cloud(folder / "source.ply").points)
+    status, out, _ = call("register", "millimetres.npy", "target.npy", "--scale", "--output", "metres.ply")
+    assert status == 0
+    assert np.allclose(1000 * pose_of(out)[:3, :3], T[:3, :3], atol=1e-3)
+    assert np.allclose(fa.read_cloud("metres.ply").points, np.load("target.npy"), atol=1e-2)
+    (folder / "millimetres.npy").unlink()
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--dof", "sideways"), "dof must name freedoms among rx, ry, rz, x, y, z"),
+        (("--dof-axis", "0,0,1"), "there is no --dof"),
+        (("--dof", "yaw", "--dof-axis", "up"), "axis of dof must be three"),
+        (("--scale", "--method", "paper"), "leave search, search_radius, search_angle and scale out"),
+    ],
+)
+def test_freedoms_that_are_none_are_one_line(call, options, words):
+    answer = call("register", "source.ply", "target.npy", *options)
+    assert is_one_error(*answer)
+    assert words in answer[2]

@@ -8,12 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from ..dof import Dof
 from ..errors import ArgumentError
-from ..motions import Matrix, as_rigid
+from ..motions import Matrix, as_rigid, as_similar
 
 
-def read_pose(text: str, name: str = "init") -> Matrix:
-    """A rigid motion (4, 4) from a file (.npy, .json, or text of 4 rows) or from 16 numbers, row by row.
+def read_pose(text: str, name: str = "init", scaled: bool = False) -> Matrix:
+    """A rigid motion (4, 4) from a file (.npy, .json, or text of 4 rows) or from 16 numbers, row by row; or a
+    similarity.
 
     A .json file holds 4 rows, or an object with the key T_target_source, as `--json` writes it.
     name: of the argument, in errors. Raises ArgumentError where it is none.
@@ -25,7 +27,7 @@ def read_pose(text: str, name: str = "init") -> Matrix:
         raise ArgumentError(f"{name} must be {wanted}, but is {text!r}: {error}") from error
     if np.size(values) != 16:
         raise ArgumentError(f"{name} must hold 16 numbers (4 x 4, row by row), but {text!r} holds {np.size(values)}")
-    return as_rigid(np.reshape(values, (4, 4)), name)
+    return (as_similar if scaled else as_rigid)(np.reshape(values, (4, 4)), name)
 
 
 def _from_file(path: Path) -> Any:
@@ -35,3 +37,12 @@ def _from_file(path: Path) -> Any:
         content = json.loads(path.read_text())
         return content.get("T_target_source", content) if isinstance(content, dict) else content
     return np.loadtxt(path)
+
+
+def read_dof(free: str | None, axis: str | None, centre: str | None) -> Dof | None:
+    """What is free, of what stands on the command line; None: all."""
+    if free is None:
+        if axis is not None or centre is not None:
+            raise ArgumentError("--dof-axis and --dof-centre say about what --dof is free, but there is no --dof")
+        return None
+    return Dof(free, *(None if part is None else part.replace(",", " ").split() for part in (axis, centre)))

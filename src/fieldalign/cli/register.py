@@ -12,7 +12,7 @@ from ..errors import ArgumentError
 from ..fields.files import read_shape
 from .answers import tell, write_json
 from .files import check_output, check_picture, drawn, write_moved
-from .poses import read_pose
+from .poses import read_dof, read_pose
 from .progress import stages
 
 
@@ -22,6 +22,10 @@ from .progress import stages
 @click.option("--init", metavar="POSE", help="Guess of T_target_source: .txt, .npy, .json, or 16 numbers.")
 @click.option("--search-radius", type=float, help="With --init: search so far from it (the clouds' unit).")
 @click.option("--search-angle", type=float, help="With --init: search so far from it (degrees).")
+@click.option("--dof", metavar="NAMES", help="What is free: levelled, planar, yaw, or any of 'rx ry rz x y z'.")
+@click.option("--dof-axis", metavar="X,Y,Z", help="With --dof: the axis that z stands for, in TARGET's frame.")
+@click.option("--dof-centre", metavar="X,Y,Z", help="With --dof: about which place it turns, in TARGET's frame.")
+@click.option("--scale", is_flag=True, help="SOURCE is in another unit: its scale is sought, too.")
 @click.option("--output", type=click.Path(), help="Write the source, moved into the target's frame, to this file.")
 @click.option("--json", "json_path", type=click.Path(allow_dash=True), help="Write the result as JSON; - for stdout.")
 @click.option("--picture", type=click.Path(), help="Draw both clouds before and after (.png, .svg, .pdf).")
@@ -38,6 +42,10 @@ def command(
     init: str | None,
     search_radius: float | None,
     search_angle: float | None,
+    dof: str | None,
+    dof_axis: str | None,
+    dof_centre: str | None,
+    scale: bool,
     output: str | None,
     json_path: str | None,
     picture: str | None,
@@ -53,7 +61,8 @@ def command(
     meshes, taken by their triangles (.stl, .ply, .obj, .off), or volumes (.nrrd, .nhdr, .npz with `values`).
     """
     chosen = _settings(method, settings, length_scale)
-    guess = None if init is None else read_pose(init)
+    guess = None if init is None else read_pose(init, scaled=scale)
+    free = read_dof(dof, dof_axis, dof_centre)
     check_output(output)
     check_picture(picture)
     with stages("reading source", "reading target", "aligning", "writing") as stage:
@@ -65,7 +74,7 @@ def command(
         stage()
         result = fa.register(
             source_shape, target_shape, init=guess, search_radius=search_radius, search_angle=search_angle,
-            method=method, settings=chosen, seed=seed, threads=threads,
+            method=method, settings=chosen, seed=seed, threads=threads, dof=free, scale=scale,
         )
         stage()
         if output is not None:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import ArgumentError
+from ..motions import size_of
 
 Array = NDArray[Any]
 
@@ -71,11 +72,17 @@ class PointCloud:
         return PointCloud(**taken)
 
     def transformed(self, T: ArrayLike) -> PointCloud:
-        """The cloud moved by the rigid (4, 4) motion T: points, normals and viewpoint; points become float64."""
+        """The cloud moved by T (4, 4), a rigid motion or a similarity: points, normals and viewpoint; points become
+        float64."""
         T = np.asarray(T, float)
         moved = np.asarray(self.points, float) @ T[:3, :3].T + T[:3, 3]
-        normals = None if self.normals is None else self.normals @ T[:3, :3].T
-        viewpoint = None if self.viewpoint is None else T @ self.viewpoint
+        turn = np.eye(4)
+        turn[:3, :3] = T[:3, :3] / size_of(T)
+        normals = None if self.normals is None else self.normals @ turn[:3, :3].T
+        viewpoint = None
+        if self.viewpoint is not None:
+            viewpoint = turn @ self.viewpoint
+            viewpoint[:3, 3] = T[:3, :3] @ self.viewpoint[:3, 3] + T[:3, 3]
         return replace(self, points=moved, normals=normals, viewpoint=viewpoint)
 
 
