@@ -350,7 +350,7 @@ def test_what_a_format_cannot_hold_is_told(call):
     assert err.startswith("Warning: moved.npy: .npy files have no place for")
 
 
-# ---------------------------------------------------------------------------------------------------- freedoms and scale
+# --------------------------------------------------------------------------------------------------- freedoms and scale
 
 
 def test_what_is_not_free_stays(call, scans):
