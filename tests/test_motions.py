@@ -7,11 +7,19 @@ from fieldalign.motions import (
     adjoint,
     apply,
     as_rigid,
+    as_similar,
     exp_twist,
+    growth,
     inverse,
     log_motion,
     nearest_rotation,
+    orthonormal,
+    quaternions_of,
     rotate,
+    rotation_between,
+    rotations_of,
+    seen_from,
+    size_of,
     translation,
 )
 
@@ -123,3 +131,164 @@ def test_nearest_rotation_is_never_a_reflection(rng):
 def test_as_rigid_refuses_what_is_no_motion(pose, word):
     with pytest.raises(ArgumentError, match=f"init.*{word}"):
         as_rigid(pose, "init")
+
+
+# -------------------------------------------------------------------------------------------------------- quaternions
+
+
+def turns(rng):
+    """Rotations (B, 3, 3): any, none, half turns about all sorts of axes, and what is near to these."""
+    axes = np.vstack([np.eye(3), -np.eye(3), rng.normal(size=(6, 3))])
+    axes /= np.linalg.norm(axes, axis=1)[:, None]
+    angles = [0.0, 1e-12, 1e-7, 1.0, 2.0, np.pi - 1e-7, np.pi - 1e-12, np.pi, np.pi + 1e-9, 5.0]
+    return Rotation.from_rotvec(np.vstack([angle * axes for angle in angles]))
+
+
+def test_quaternions_are_scipys_up_to_their_sign(rng):
+    rotations = turns(rng)
+    expected, found = rotations.as_quat(scalar_first=True), quaternions_of(rotations.as_matrix())
+    signs = np.sign((expected * found).sum(axis=1))[:, None]
+    assert np.allclose(found, signs * expected, rtol=0, atol=1e-15)
+    assert np.allclose(np.linalg.norm(found, axis=1), 1, rtol=0, atol=1e-15)
+
+
+def test_rotations_of_quaternions_are_scipys(rng):
+    rotations = turns(rng)
+    q = rotations.as_quat(scalar_first=True)
+    for signed in (q, -q):
+        assert np.allclose(rotations_of(signed), rotations.as_matrix(), rtol=0, atol=2e-15)
+
+
+def test_quaternions_and_rotations_undo_each_other(rng):
+    R = turns(rng).as_matrix()
+    assert np.allclose(rotations_of(quaternions_of(R)), R, rtol=0, atol=3e-15)
+
+
+def test_no_rotation_has_no_quaternion():
+    assert quaternions_of(np.empty((0, 3, 3))).shape == (0, 4)
+    assert rotations_of(np.empty((0, 4))).shape == (0, 3, 3)
+
+
+# --------------------------------------------------------------------------------------------------- between directions
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-6, 1e-3, 1.0, 2.0, 3.0, np.pi])
+def test_the_rotation_between_two_directions_is_the_smallest(rng, angle):
+    """It turns about what is across both, by the angle between them; their lengths do not matter."""
+    for _ in range(5):
+        a, other = rng.normal(size=(2, 3))
+        across = np.cross(a, other) / np.linalg.norm(np.cross(a, other))
+        b = Rotation.from_rotvec(angle * across).apply(a)
+        R = rotation_between(3 * a, 0.2 * b)
+        assert np.allclose(R @ a, b, rtol=0, atol=1e-10)
+        assert np.allclose(R @ R.T, np.eye(3), rtol=0, atol=1e-10)
+        assert np.linalg.det(R) == pytest.approx(1)
+        turn = Rotation.from_matrix(R).as_rotvec()
+        assert np.linalg.norm(turn) == pytest.approx(angle, abs=1e-7)
+        assert angle == np.pi or np.allclose(turn, angle * across, rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize("axis", [*np.eye(3), *-np.eye(3)], ids=str)
+def test_opposite_axes_are_half_a_turn_apart(axis):
+    R = rotation_between(axis, -axis)
+    assert np.allclose(R @ axis, -axis, atol=1e-15)
+    assert np.allclose(R @ R.T, np.eye(3), atol=1e-15)
+    assert np.linalg.det(R) == pytest.approx(1)
+
+
+@pytest.mark.xfail(strict=True, raises=(AssertionError, RuntimeWarning),
+                   reason="1 + a @ b has lost its digits: use half @ half / 2, or two reflections")
+@pytest.mark.parametrize("away", [1e-4, 1e-6, 1e-7, 1e-8, 1e-9])
+def test_nearly_opposite_directions_too(away):
+    a, b = np.array([0.0, 0, 1]), np.array([away, 0, -1.0])
+    R = rotation_between(a, b)
+    assert np.allclose(R @ a, b / np.linalg.norm(b), rtol=0, atol=1e-9)
+    assert np.allclose(R @ R.T, np.eye(3), rtol=0, atol=1e-9)
+
+
+# --------------------------------------------------------------------------------------------------------- similarities
+
+
+def similarity(rng, size):
+    return exp_twist(np.r_[rng.normal(size=3), 5 * rng.normal(size=3)]) @ growth(size)
+
+
+@pytest.mark.parametrize("factor", [1e-3, 1.0, 0.37, 1000.0])
+def test_a_growth_multiplies_places_and_is_told_again(rng, factor):
+    points = rng.normal(size=(20, 3))
+    assert np.allclose(apply(growth(factor), points), factor * points, rtol=1e-15)
+    assert size_of(similarity(rng, factor)) == pytest.approx(factor, rel=1e-14)
+    assert size_of(growth(factor)) == pytest.approx(factor, rel=1e-15)
+
+
+@pytest.mark.parametrize("size", [1e-6, 0.37, 1.0, 1000.0])
+def test_a_similarity_is_taken_as_it_is(rng, size):
+    T = similarity(rng, size)
+    assert np.allclose(as_similar(T.tolist(), "init"), T, rtol=1e-13, atol=1e-13 * size)
+
+
+def test_a_similarity_with_few_digits_is_cleaned(rng):
+    T = similarity(rng, 2.5)
+    cleaned = as_similar(np.round(T, 5), "init")
+    R = cleaned[:3, :3] / size_of(cleaned)
+    assert np.allclose(R @ R.T, np.eye(3), rtol=0, atol=1e-14)
+    assert np.allclose(cleaned, T, rtol=0, atol=2e-5)
+
+
+@pytest.mark.parametrize(
+    ("pose", "word"),
+    [
+        (np.eye(3), "shape"),
+        (np.diag([2, 2, -2, 1]), "rotation"),
+        (np.diag([-2, -2, -2, 1]), "rotation"),
+        (np.diag([2, 2, 2.1, 1]), "rotation"),
+        (np.diag([0, 0, 0, 1]), "rotation"),
+        (np.diag([2, 2, 2, 2]), "row"),
+        (np.full((4, 4), np.nan), "finite"),
+        pytest.param("pose", "numbers", marks=pytest.mark.xfail(strict=True, reason="a bare ValueError of NumPy")),
+        pytest.param([[1, 2], [3]], "numbers", marks=pytest.mark.xfail(strict=True, reason="a ValueError of NumPy")),
+    ],
+)
+def test_as_similar_refuses_what_is_no_similarity(pose, word):
+    with pytest.raises(ArgumentError, match=f"init.*{word}"):
+        as_similar(pose, "init")
+
+
+def test_orthonormal_cleans_the_turn_and_keeps_the_shift(rng):
+    T = exp_twist(np.r_[rng.normal(size=3), 5e6 * rng.normal(size=3)])
+    rough = T.copy()
+    rough[:3, :3] += 1e-6 * rng.normal(size=(3, 3))
+    before = rough.copy()
+    cleaned = orthonormal(rough)
+    assert np.array_equal(rough, before)
+    assert np.array_equal(cleaned[:, 3], T[:, 3])
+    assert np.allclose(cleaned[:3, :3] @ cleaned[:3, :3].T, np.eye(3), rtol=0, atol=1e-15)
+    assert np.allclose(cleaned, T, rtol=0, atol=1e-5)
+
+
+def grown_about(place, x):
+    """The similarity that a twist and a growth (7,) generate about a place."""
+    return translation(place) @ growth(np.exp(x[6])) @ exp_twist(x[:6]) @ translation(-place)
+
+
+@pytest.mark.parametrize("size", [0.2, 1.0, 30.0])
+def test_a_small_motion_after_a_similarity_is_another_one_before_it(rng, size):
+    """To first order T grown_about(0, seen x) = grown_about(c', x) T, where c' is where T takes the place c."""
+    T, place = similarity(rng, size), rng.normal(size=3)
+    rigid = T @ growth(1 / size)
+    there = apply(T, place[None])[0]
+    seen = seen_from(rigid, size, place)
+    for x in (*np.eye(7), rng.normal(size=7)):
+        errors = [np.abs(T @ grown_about(np.zeros(3), seen @ (e * x)) - grown_about(there, e * x) @ T).max()
+                  for e in (1e-3, 1e-5)]
+        assert errors[0] < 1e-4 * (1 + size)
+        assert errors[1] < 3e-4 * errors[0] + 1e-12 * (1 + size)
+
+
+def test_seen_from_itself_is_the_adjoint_of_the_place(rng):
+    """Without a turn, a scale and a growth a twist about a place is one about the origin."""
+    place = rng.normal(size=3)
+    assert np.allclose(seen_from(np.eye(4), 1.0, place)[:6, :6], adjoint(translation(place)), atol=1e-15)
+    T = exp_twist(rng.normal(size=6))
+    about = translation(-apply(T, place[None])[0]) @ T
+    assert np.allclose(seen_from(T, 1.0, place)[:6, :6], adjoint(inverse(about)), atol=1e-14)

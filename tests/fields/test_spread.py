@@ -59,7 +59,7 @@ surfaces = pytest.mark.parametrize(
 def test_they_lie_on_the_surface_and_are_about_as_many_as_asked(function, area, count, make):
     places = spread_over(make(function), count)
     assert places.shape[1:] == (3,)
-    assert np.abs(function(places)).max() < 1e-9
+    assert np.abs(function(places)).max() < 1e-8
     assert 0.8 * count < len(places) < 2 * count
 
 
@@ -113,7 +113,7 @@ def test_a_flat_box_of_bounds_is_enough():
     """A surface much larger one way than the other."""
     low, high = np.array([-10, -1, -0.01]), np.array([10, 1, 0.01])
     places = spread_over(CallableField(lambda x: x[:, 2], [low, high]), 1000)
-    assert not places[:, 2].any()
+    assert np.abs(places[:, 2]).max() < 1e-12
     assert 0.8 * 1000 < len(places) < 2000
     assert np.ptp(places[:, 0]) > 19
 

@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import ArgumentError, FieldError
-from .protocol import FieldSample, Floats, newton_foot
+from .protocol import FieldSample, Floats, Planes, exact_planes, newton_foot, unit
+from .spread import spread_by
 from .torch_module import as_torch_module
 
 _PROBES = 512   # places in the bounds that show whether values are negative somewhere
+_FLAT = 0.5     # of a distance's slope: less has no direction
 _STEP = 6e-6    # of the bounds' diagonal, between the values that a derivative is made of: about the cube root of 2^-53
 
 
@@ -68,6 +70,20 @@ class CallableField:
         value, gradient = self._values_and_gradients(places)
         foot = newton_foot(places, value, gradient)
         return FieldSample(value, gradient, foot, lambda: self._normals(foot))
+
+    def planes(self, x: Floats, neighbours: int, last: Planes | None = None) -> Planes:
+        """The planes at the feet of the places x (L, 3). A distance changes at x as it does at the foot, so no more is
+        asked, but where it hardly changes: on the surface of an unsigned field."""
+        value, gradient = self._values_and_gradients(x)
+        foot, normal = newton_foot(x, value, gradient), unit(gradient)
+        flat = np.linalg.norm(gradient, axis=1) < _FLAT
+        if flat.any():
+            normal[flat] = self._normals(foot[flat])
+        return exact_planes(foot, normal)
+
+    def spread(self, count: int) -> Floats:
+        """About `count` places (n, 3) on the surface within the bounds, spread evenly."""
+        return spread_by(self._values, self._gradients, self.bounds, count, "CallableField")
 
     def _normals(self, feet: Floats) -> Floats:
         gradient = self._gradients(feet)

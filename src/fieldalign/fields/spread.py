@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..errors import FieldError
-from .protocol import DistanceField, Floats, HasSpread, sampled
+from .protocol import DistanceField, Floats, HasSpread, newton_foot, sampled
 
 _FIRST = 16     # cells along the longest edge of the box
 _STRAY = 1.2    # half diagonals of a cell: if the surface is nearer, by what is nearly a distance, it may cross
@@ -25,15 +25,15 @@ def spread_over(field: DistanceField, count: int) -> Floats:
         return field.spread(count)
     return spread_by(
         lambda x: sampled(field, x).value,
-        lambda x: sampled(field, x).foot,
+        lambda x: sampled(field, x).gradient,
         np.asarray(field.bounds, float), count, type(field).__name__,
     )
 
 
 def spread_by(
-    values: Callable[[Floats], Floats], feet: Callable[[Floats], Floats], bounds: Floats, count: int, name: str
+    values: Callable[[Floats], Floats], gradients: Callable[[Floats], Floats], bounds: Floats, count: int, name: str
 ) -> Floats:
-    """About `count` places (n, 3) on the surface in a box (2, 3), from functions of places to distances and to feet.
+    """About `count` places (n, 3) on the surface in a box (2, 3), from a distance and its gradient.
 
     Cells of the box that the surface may cross are halved until they are `count`; the feet of some of their centres,
     which lie evenly along the surface, are the places. name: of the field, for errors.
@@ -41,9 +41,11 @@ def spread_by(
     centres, edge = _cells_near(values, bounds, count, name)
     # They are in the order of an octree's leaves, so that a part of them, taken evenly, lies evenly in space.
     places = centres[np.linspace(0, len(centres), min(count, len(centres)), endpoint=False, dtype=int)]
-    for _ in range(_STEPS):
-        places = feet(places)
-    places = places[np.abs(values(places)) <= _ON * edge]
+    found, downhill = values(places), gradients(places)
+    for _ in range(_STEPS):  # by one gradient: it costs as much as several values
+        places = newton_foot(places, found, downhill)
+        found = values(places)
+    places = places[np.abs(found) <= _ON * edge]
     if len(places) < 3:
         raise FieldError(f"{name} has no surface within its bounds that its gradient leads to")
     return places

@@ -88,10 +88,14 @@ def left_at(init: Floats, pair: Pair, refined: Refined) -> Refined:
 def at_its_size(pair: Pair, refined: list[Refined]) -> tuple[Pair, list[Refined]]:
     """The pair with the source as large as the best pose found it, and the poses refined there."""
     growth = refined[0].last.growth
-    size = pair.source.factor * (growth if pair.is_swapped else 1 / growth)
+    poses = [r.G.copy() for r in refined]
+    if not pair.is_swapped:  # instead of what moves having grown, the source that is held shrinks
+        growth = 1 / growth
+        for G in poses:
+            G[:3, 3] *= growth
     assert isinstance(pair.source, ScaledCloud)
-    pair = replace(pair, source=ScaledCloud(pair.source.original, size))
-    return pair, [refine(pair, r.G) for r in refined]
+    pair = replace(pair, source=ScaledCloud(pair.source.original, growth * pair.source.factor))
+    return pair, [refine(pair, G) for G in poses]
 
 
 def at_copies(pair: Pair, refined: Refined) -> Refined:

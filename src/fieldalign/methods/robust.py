@@ -56,7 +56,6 @@ class Start:
         return self.searches and (self.init is None or bool(np.isinf(self.radius) and self.angle == np.pi))
 
 
-
 def register_robust(
     source: PreparedCloud, target: PreparedCloud, start: Start, seed: int, threads: int, clock: Clock,
     other_scale: float = 0.0,
@@ -64,11 +63,10 @@ def register_robust(
     """From any pose, or from a guess, to a result. other_scale: the best score of a clearly different scale."""
     pair = _prepared_pair(source, target, start, threads, clock)
     held, moving = pair.surfaces()
-    guess = pair.guessed_pose
     poses = starting_poses(pair, start, seed, threads)
     clock.lap("search")
     poses, scores = anneal(held, moving, poses, seed, threads, pair.allowed)
-    contest = _contest(pair, poses, scores, guess, start.searches_everywhere, seed, threads)
+    contest = _contest(pair, poses, scores, pair.guessed_pose, start.searches_everywhere, seed, threads)
     contest = replace(contest, other_scale=other_scale)
     clock.lap("anneal")
     refined = [at_copies(pair, refine(pair, G)) for G in _rivals(pair, poses, scores)]
