@@ -5,7 +5,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 SOURCES := $(shell find src cpp -name '*.py' -o -name '*.hpp' -o -name '*.cpp' -o -name '*.pyi') CMakeLists.txt pyproject.toml
 
-.PHONY: demo test lint bench-paper bench-any-pose bench-verdict wheels clean
+.PHONY: demo test lint bench-paper bench-any-pose bench-verdict bench-fields bench-assemble wheels clean
 
 demo: $(VENV)/.installed-viz      ## simulate two scans of a room, register them, compare with the truth
 	$(BIN)/fieldalign demo --output demo
@@ -26,6 +26,14 @@ bench-any-pose:                   ## search and accuracy from any pose, beside t
 bench-verdict:                    ## false and true acceptances, ROC and covariance beside the peers; an hour
 	$(MAKE) VENV=$(VENV)-bench $(VENV)-bench/.installed-bench
 	$(VENV)-bench/bin/python benchmarks/verdict.py --output docs/benchmarks
+
+bench-fields:                     ## every kind of field on each other, meshes, volumes, freedoms; a quarter of an hour
+	$(MAKE) VENV=$(VENV)-bench $(VENV)-bench/.installed-bench,mesh
+	$(VENV)-bench/bin/python benchmarks/fields.py --output docs/benchmarks
+
+bench-assemble:                   ## many scans: real sets and a heap of them beside the peers, a building; two hours
+	$(MAKE) VENV=$(VENV)-bench $(VENV)-bench/.installed-bench,dask
+	$(VENV)-bench/bin/python benchmarks/assemble.py --output docs/benchmarks
 
 wheels: $(VENV)/bin/python        ## wheels for this platform, as CI builds them
 	$(BIN)/pip install --quiet cibuildwheel

@@ -112,6 +112,13 @@ def levelled(size: float, rng: np.random.Generator) -> np.ndarray:
     return T
 
 
+def pushed(T: np.ndarray, centre: np.ndarray, angle: float, length: float, rng: np.random.Generator) -> np.ndarray:
+    """A motion, off by an angle (rad) and a length about where it takes the centre (3,)."""
+    turn, middle = np.eye(4), apply(T, centre[None])[0]
+    turn[:3, :3] = Rotation.from_rotvec(angle * direction(rng)).as_matrix()
+    return shift(middle + length * direction(rng)) @ turn @ shift(-middle) @ T
+
+
 def made(kind: str, shape: Shape, T: np.ndarray, points: np.ndarray, rng: np.random.Generator):
     """A kind of surface, moved by T (4, 4); a cloud is made of the given points (N, 3) of the shape, with noise."""
     if kind == "points":
@@ -134,11 +141,6 @@ def volume_of(mesh: MeshField) -> VolumeField:
 
 
 # ------------------------------------------------------------------------------------------------ fused scans
-
-
-def stanford(name: str) -> tuple[list[str], list[np.ndarray], np.ndarray]:
-    """Names, points (N, 3) each in its scanner's frame, and world_from_scan (n, 4, 4)."""
-    return scenes._stanford(name)
 
 
 def fused(scans: list[np.ndarray], world_from_scan: np.ndarray) -> VolumeField:
@@ -164,16 +166,16 @@ def fused(scans: list[np.ndarray], world_from_scan: np.ndarray) -> VolumeField:
 
 
 def blocks_near(u: np.ndarray) -> np.ndarray:
-    """The blocks (B, 3) within half a block, which is the truncation, of places u (N, 3) counted in blocks from 0 on."""
+    """The blocks (B, 3) within half a block, which is the truncation, of places u (N, 3), in blocks."""
     touched = np.concatenate([np.floor(u + corner).astype(np.int64) for corner in product((-0.5, 0.5), repeat=3)])
     counts = touched.max(axis=0) + 1
     return np.stack(np.unravel_index(np.unique(np.ravel_multi_index(touched.T, counts)), counts), axis=1)
 
 
 def seen_by(scan: PointField, towards: np.ndarray, nodes: np.ndarray, voxel: float) -> tuple[np.ndarray, np.ndarray]:
-    """For nodes (n, 3) the height (n,) over the plane of a scan's nearest points, positive towards the scanner (3,), and
-    what it counts for: as the surface faces the scanner, less behind it; nothing beyond the truncation, off the scan's
-    edge, and where the points lie in no plane."""
+    """For nodes (n, 3) the height (n,) over the plane of a scan's nearest points, positive towards the scanner (3,),
+    and what it counts for: as the surface faces the scanner, less behind it; nothing beyond the truncation, off the
+    scan's edge, and where the points lie in no plane."""
     near = scan.nearest(nodes)[1][:, 0]
     mean, normal, (across, along) = (part.T for part in scan.surfels(scan.points, scan.normal_neighbours))
     facing = towards @ normal
@@ -191,11 +193,11 @@ def wrong_pairs(count: int, seed: int, motion) -> Iterator[tuple]:
     """kind, name, source and target (N, 3) of pairs that no motion of their kind, and no scale, can be right for.
 
     "crossed": clouds of different scenes, scaled to one extent. "mirrored": two halves of one cloud's points, drawn by
-    chance, one as an upright mirror shows it; shapes, many of them symmetric, are left out. motion: levelled or anywhere.
+    chance, one as an upright mirror shows it; shapes, many of them symmetric, are left out. motion: levelled or
+    anywhere.
     """
-    pool = [*clouds(FIT), *clouds(REPORT)]
     for k in range(count):
-        rng = np.random.default_rng([seed, k])
+        rng, pool = np.random.default_rng([seed, k]), clouds((FIT, REPORT)[k // 2 % 2])  # one half: no scene is in both
         if k % 2:
             a = b = rng.choice([cloud for cloud in pool if cloud.set != "shapes"])
             whole = a.load(False)
@@ -203,7 +205,7 @@ def wrong_pairs(count: int, seed: int, motion) -> Iterator[tuple]:
             across = scenes._unit(np.r_[rng.normal(size=2), 0])
             source, target = whole.taken(half).reflected(across), whole.taken(~half)
         else:
-            a, b = next(pair for pair in iter(lambda: rng.choice(pool, 2), None) if not may_meet(*pair))
+            a, b = next((a, b) for a, b in rng.choice(pool, (1000, 2)) if not may_meet(a, b))
             source, target = (cloud.load(False) for cloud in (a, b))
             source = source.scaled(target.extent() / source.extent())
         name, kind = f"{a.name} x {b.name}" if a is not b else a.name, "mirrored" if k % 2 else "crossed"

@@ -43,6 +43,9 @@ inline std::optional<PairFeature> ordered_feature(const Plane*& a, const Plane*&
 
 class PairTable {
  public:
+  static constexpr int kDistances = 20, kSteep = 10, kBetween = 8;
+  static constexpr std::size_t kBins = std::size_t{kDistances} * kSteep * kSteep * kBetween * 2;
+
   struct Pair {
     std::uint16_t first, second;
   };
@@ -54,6 +57,13 @@ class PairTable {
   PairBand band() const { return band_; }
   std::span<const Plane> members() const { return members_; }
 
+  // How many pairs there are of each look.
+  std::vector<std::uint32_t> counts() const {
+    std::vector<std::uint32_t> numbers(kBins);
+    for (std::size_t b = 0; b < kBins; ++b) numbers[b] = begin_[b + 1] - begin_[b];
+    return numbers;
+  }
+
   // The pairs that look like this one.
   std::span<const Pair> like(const PairFeature& f) const {
     const std::size_t bin = bin_of(f);
@@ -61,9 +71,6 @@ class PairTable {
   }
 
  private:
-  static constexpr int kDistances = 20, kSteep = 10, kBetween = 8;
-  static constexpr std::size_t kBins = std::size_t{kDistances} * kSteep * kSteep * kBetween * 2;
-
   std::size_t bin_of(const PairFeature& f) const {
     const auto bin = [](float share, int count) {
       return static_cast<std::size_t>(std::clamp(static_cast<int>(share * static_cast<float>(count)), 0, count - 1));

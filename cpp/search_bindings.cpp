@@ -272,7 +272,8 @@ void bind_search(nb::module_& m) {
            "threads"_a);
   nb::class_<PairTable>(m, "PairTable", "Pairs of surfels, found again by what no rigid motion changes.")
       .def("__init__", &construct_table, "means"_a, "normals"_a, "shortest"_a, "longest"_a, "threads"_a)
-      .def("__len__", &PairTable::size);
+      .def("__len__", &PairTable::size)
+      .def("counts", [](const PairTable& table) { return array(table.counts(), {PairTable::kBins}); });
   nb::class_<Sight>(m, "Sight", "What a sensor saw from where it stood.")
       .def("__init__", &construct_sight, "points"_a, "eye"_a, "cells"_a)
       .def("ranges", &ranges, "places"_a);

@@ -133,7 +133,7 @@ def test_as_rigid_refuses_what_is_no_motion(pose, word):
         as_rigid(pose, "init")
 
 
-# -------------------------------------------------------------------------------------------------------- quaternions
+# ---------------------------------------------------------------------------------------------------------- quaternions
 
 
 def turns(rng):
@@ -196,8 +196,6 @@ def test_opposite_axes_are_half_a_turn_apart(axis):
     assert np.linalg.det(R) == pytest.approx(1)
 
 
-@pytest.mark.xfail(strict=True, raises=(AssertionError, RuntimeWarning),
-                   reason="1 + a @ b has lost its digits: use half @ half / 2, or two reflections")
 @pytest.mark.parametrize("away", [1e-4, 1e-6, 1e-7, 1e-8, 1e-9])
 def test_nearly_opposite_directions_too(away):
     a, b = np.array([0.0, 0, 1]), np.array([away, 0, -1.0])
@@ -245,8 +243,8 @@ def test_a_similarity_with_few_digits_is_cleaned(rng):
         (np.diag([0, 0, 0, 1]), "rotation"),
         (np.diag([2, 2, 2, 2]), "row"),
         (np.full((4, 4), np.nan), "finite"),
-        pytest.param("pose", "numbers", marks=pytest.mark.xfail(strict=True, reason="a bare ValueError of NumPy")),
-        pytest.param([[1, 2], [3]], "numbers", marks=pytest.mark.xfail(strict=True, reason="a ValueError of NumPy")),
+        ("pose", "numbers"),
+        ([[1, 2], [3]], "numbers"),
     ],
 )
 def test_as_similar_refuses_what_is_no_similarity(pose, word):
@@ -262,7 +260,7 @@ def test_orthonormal_cleans_the_turn_and_keeps_the_shift(rng):
     cleaned = orthonormal(rough)
     assert np.array_equal(rough, before)
     assert np.array_equal(cleaned[:, 3], T[:, 3])
-    assert np.allclose(cleaned[:3, :3] @ cleaned[:3, :3].T, np.eye(3), rtol=0, atol=1e-15)
+    assert np.allclose(cleaned[:3, :3] @ cleaned[:3, :3].T, np.eye(3), rtol=0, atol=4e-15)
     assert np.allclose(cleaned, T, rtol=0, atol=1e-5)
 
 

@@ -3,15 +3,19 @@
 import logging
 
 from . import fields
+from .assemble import assemble
+from .assembly.assembly import Assembly
+from .assembly.pair_result import PairResult
 from .clouds.cloud import PointCloud
 from .clouds.files import read_cloud, read_clouds, write_cloud
 from .clouds.thinning import thin
 from .dof import Dof
-from .errors import ArgumentError, CloudFileError, FieldalignError, FieldError, MissingExtraError
+from .errors import ArgumentError, CloudFileError, FieldalignError, FieldError, MissingExtraError, RunError
 from .inspection import Deviation, deviation
 from .prepare import prepare
 from .prepared import PreparedCloud
 from .register import register
+from .register_many import register_many
 from .result import RegistrationResult
 from .settings import PRESETS, Settings
 from .verdict import Evidence, Freedom, Reason
@@ -21,6 +25,7 @@ __version__ = "0.1.0"
 __all__ = [
     "PRESETS",
     "ArgumentError",
+    "Assembly",
     "CloudFileError",
     "Deviation",
     "Dof",
@@ -29,17 +34,21 @@ __all__ = [
     "FieldalignError",
     "Freedom",
     "MissingExtraError",
+    "PairResult",
     "PointCloud",
     "PreparedCloud",
     "Reason",
     "RegistrationResult",
+    "RunError",
     "Settings",
+    "assemble",
     "deviation",
     "fields",
     "prepare",
     "read_cloud",
     "read_clouds",
     "register",
+    "register_many",
     "thin",
     "verify",
     "write_cloud",

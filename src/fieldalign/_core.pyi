@@ -117,6 +117,8 @@ class PairTable:
 
     def __init__(self, means: Floats, normals: Floats, shortest: float, longest: float, threads: int) -> None: ...
     def __len__(self) -> int: ...
+    def counts(self) -> NDArray[uint32]:
+        """How many pairs there are of each look (k,)."""
 
 def search(
     grid: ClosestGrid,

@@ -45,10 +45,12 @@ class Dof:
     centre: ArrayLike | None = None
 
     def __post_init__(self) -> None:
-        given = self.free.replace(",", " ").split() if isinstance(self.free, str) else list(self.free)
-        names = [name for word in given for name in WORDS.get(word, (word,))]
-        unknown = [name for name in names if name not in NAMES]
-        if unknown or not names:
+        given = self.free
+        if isinstance(given, str):
+            given = given.replace(",", " ").split()
+        words = list(given) if isinstance(given, Iterable) else []
+        names = [name for word in words for name in (WORDS.get(word, (word,)) if isinstance(word, str) else (None,))]
+        if not names or any(name not in NAMES for name in names):
             allowed = ", ".join((*NAMES, *WORDS))
             raise ArgumentError(f"dof must name freedoms among {allowed}, but is {self.free!r}")
         axis = None if self.axis is None else as_vector(self.axis, "axis of dof")
@@ -67,6 +69,15 @@ class Dof:
         T[:3, 3] = self.centre
         return T
 
+    def about(self, place: Floats) -> Dof:
+        """The same freedoms about a place (3,) of the target, where the centre makes no difference: without turns, or
+        with one, and shifts across its axis. So a centre that is far away, as the origin of UTM is, loses no digits."""
+        turns, shifts = self.mask[:3], self.mask[3:]
+        across = np.flatnonzero(turns == 0)
+        if turns.sum() > 1 or (turns.any() and not shifts[across].all()):
+            return self
+        return Dof(self.free, self.axis, place)
+
     @property
     def mask(self) -> Floats:
         """1 for each freedom (6,) that is free, in the order of NAMES, else 0."""
@@ -77,7 +88,7 @@ def as_dof(dof: Dof | str | Iterable[str] | None) -> Dof | None:
     """Dof of what a caller says; None where all six are free. Raises ArgumentError for what says nothing."""
     if dof is None or isinstance(dof, Dof):
         chosen = dof
-    elif isinstance(dof, str) or (isinstance(dof, Iterable) and all(isinstance(name, str) for name in dof)):
+    elif isinstance(dof, Iterable):
         chosen = Dof(dof)
     else:
         raise ArgumentError(f"dof must be names of freedoms, or fa.Dof(names, axis, centre), but is {dof!r}")
@@ -148,7 +159,8 @@ def allowed_poses(
 ) -> Allowed:
     """The allowed among poses that take one cloud's frame, moved so that `moving` (3,) is its origin, into the other's,
     whose origin is then `held` (3,). guess: T_target_source (4, 4), None: the identity."""
-    frame, guess = dof.frame, np.eye(4) if guess is None else guess
+    frame = dof.about(held if target_is_held else moving).frame
+    guess = np.eye(4) if guess is None else guess
     left, right = translation(held), translation(-moving)
     if target_is_held:
         return Allowed(dof, inverse(frame) @ left, right @ inverse(guess) @ frame, inverted=False)

@@ -4,6 +4,7 @@
     ├── ArgumentError (ValueError)       an argument has the wrong shape, value or combination
     │   ├── CloudFileError               a file is missing, truncated, foreign or promises what it does not hold
     │   └── FieldError                   a distance field answered with the wrong shape or with NaN or infinity
+    ├── RunError                         work on many scans cannot begin or go on: its folder, the disk, the workers
     └── MissingExtraError (ImportError)  an optional dependency is not installed; the message names the extra
 
 Each message is one sentence that names the argument, says what came and what is allowed.
@@ -24,6 +25,10 @@ class CloudFileError(ArgumentError):
 
 class FieldError(ArgumentError):
     """A distance field answered with the wrong shape or with values that are not finite."""
+
+
+class RunError(FieldalignError):
+    """Work on many scans cannot begin or go on: something is wrong with its run folder, the disk or the workers."""
 
 
 class MissingExtraError(FieldalignError, ImportError):

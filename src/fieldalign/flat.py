@@ -41,7 +41,9 @@ class FlatCloud:
     """
 
     def __init__(self, points: ArrayLike, name: str, threads: int, drop_nonfinite: bool) -> None:
-        on_floor = np.asarray(points, float)
+        on_floor = np.asarray(points)
+        if on_floor.dtype.kind not in "fiu":
+            raise ArgumentError(f"{name} must be an (N, 2) array of real numbers, but has dtype {on_floor.dtype}")
         checked = checked_points(np.c_[on_floor, np.zeros(len(on_floor))], name, threads, drop_nonfinite)
         self.checked, self.dropped, self.threads = checked, checked.dropped, threads
         scale = scale_of(checked.points, threads, _CELLS)
@@ -72,20 +74,24 @@ class Walls(PreparedCloud):
 
     @lazy
     def fine(self) -> PointField:
-        """The walls, no denser along than up: so planes are laid through points that lie on either side, too."""
+        """The walls, no denser along than up."""
         return _standing(self._sparse, self._cell, self.threads)
+
+    @lazy
+    def exact(self) -> PointField:
+        """What the last level asks: three points to a column, so that planes are laid through several columns."""
+        return _standing(self._sparse, self._cell, self.threads, half=1)
 
     def pseudo_planes(self, neighbours: int, single: bool = False) -> Planes:
         """Pseudo points on the floor alone: what stands above says nothing else."""
         if (neighbours, single) not in self._pseudo:
             places = self._sparse[:: max(1, len(self._sparse) // _PSEUDO)]
-            self._pseudo[neighbours, single] = planes_near(self.fine, places, neighbours)
+            self._pseudo[neighbours, single] = planes_near(self.exact, places, neighbours)
         return self._pseudo[neighbours, single]
 
 
-def _standing(floor: Floats, cell: float, threads: int) -> PointField:
-    """Columns on places (N, 3) of the floor."""
-    half = _STOREYS * _FINER // 2
+def _standing(floor: Floats, cell: float, threads: int, half: int = _STOREYS * _FINER // 2) -> PointField:
+    """Columns on places (N, 3) of the floor, so many points up and down."""
     columns = np.repeat(floor[:, None], 2 * half + 1, axis=1)
     columns[:, :, 2] = np.arange(-half, half + 1) * cell / _FINER
     return PointField(columns.reshape(-1, 3), threads=threads)
@@ -108,9 +114,14 @@ def standing(source: FlatCloud, target: FlatCloud, scaled: bool) -> tuple[Prepar
 
 def upright(T: ArrayLike, name: str) -> Floats:
     """The (4, 4) motion of a (3, 3) one in the plane; raises ArgumentError where it is none."""
-    flat = np.asarray(T, float)
+    try:
+        flat = np.asarray(T, float)
+    except (TypeError, ValueError) as error:
+        raise ArgumentError(f"{name} must be a (3, 3) matrix of numbers, but is {T!r}") from error
     if flat.shape != (3, 3):
         raise ArgumentError(f"{name} must be a (3, 3) matrix for clouds in the plane, but has shape {flat.shape}")
+    if not np.isfinite(flat).all():
+        raise ArgumentError(f"{name} must be finite, but holds NaN or infinity")
     lifted = np.eye(4)
     lifted[:2, :2], lifted[:2, 3], lifted[3, [0, 1, 3]] = flat[:2, :2], flat[:2, 2], flat[2]
     size = float(np.sqrt(abs(np.linalg.det(flat[:2, :2]))))

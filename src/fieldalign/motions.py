@@ -146,17 +146,23 @@ def rotation_between(a: Matrix, b: Matrix) -> Matrix:
     """The smallest rotation (3, 3) that turns the direction of a (3,) into that of b (3,)."""
     a, b = a / np.linalg.norm(a), b / np.linalg.norm(b)
     half = a + b
-    if half @ half < 1e-20:  # opposite: half a turn about anything across
-        half = np.cross(a, np.eye(3)[np.argmin(np.abs(a))])
+    if half @ half < 1e-8:  # nearly opposite: half a turn about something across a, and what is left
+        across = np.cross(a, np.eye(3)[np.argmin(np.abs(a))])
+        across = across / np.linalg.norm(across)
+        return np.asarray(rotation_between(-a, b) @ (2 * np.outer(across, across) - np.eye(3)))
+    if a @ b < 0:  # two reflections: what follows divides by a small difference
         half = half / np.linalg.norm(half)
-        return np.asarray(2 * np.outer(half, half) - np.eye(3))
+        return np.asarray((np.eye(3) - 2 * np.outer(half, half)) @ (np.eye(3) - 2 * np.outer(a, a)))
     K = np.cross(np.eye(3), np.cross(a, b))
     return np.asarray(np.eye(3) + K + K @ K / (1 + a @ b))
 
 
 def as_similar(T: ArrayLike, name: str) -> Matrix:
     """T as a similarity (4, 4), float64: a rigid motion of places times a positive factor; raises ArgumentError."""
-    matrix = np.array(T, float)
+    try:
+        matrix = np.array(T, float)
+    except (TypeError, ValueError):
+        return as_rigid(T, name)  # which says what is wrong
     if matrix.shape != (4, 4) or not np.isfinite(matrix).all() or not size_of(matrix) > 0:
         return as_rigid(T, name)
     size = size_of(matrix)

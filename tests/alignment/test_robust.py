@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+import fieldalign as fa
 from fieldalign.alignment import descend
 from fieldalign.alignment.agreement import both_ways, mutual_score
 from fieldalign.alignment.robust import LEVELS, FieldStage, GridStage, anneal
 from fieldalign.clouds.simulated import simulate_pair
+from fieldalign.dof import Allowed
 from fieldalign.evaluation import rotation_error, translation_error
 from fieldalign.fields import PointField
 from fieldalign.fields.protocol import planes_near
@@ -189,3 +191,70 @@ def test_a_formula_is_met_to_the_last_digits(rng):
     stage = FieldStage(Box(), np.zeros(3), moved, 10, 0.3, 2.6, 3.0).take(np.inf, 40, 0)
     (found,), _ = descend(stage, np.eye(4)[None])
     assert np.abs(found - G).max() < 1e-9
+
+
+# ----------------------------------------------------------------------------------------- a growth, and fewer freedoms
+
+
+def box_stage(T, grown=1.0, **options):
+    """The box held, and points of it that T and then a growth bring back onto it."""
+    places = Box().sample(np.random.default_rng(4).uniform(-1.1, 1.1, (3000, 3)))[2]
+    own = planes_near(Box(), places, 10)
+    back = inverse(T)
+    moved = replace(own, mean=apply(back, own.mean) / grown, normal=rotate(back[:3, :3], own.normal))
+    return FieldStage(Box(), np.zeros(3), moved, 10, 0.3, 2.6, 3.0, **options).take(np.inf, 40, 0)
+
+
+@pytest.mark.parametrize("grown", [0.95, 1.0, 1.04])
+def test_what_grows_is_met_to_the_last_digits(rng, grown):
+    """The pose is that of what has grown: its places times the growth, then moved."""
+    G = exp_twist(np.r_[0.02 * rng.normal(size=3), 0.01 * rng.normal(size=3)])
+    stage = box_stage(G, grown, grows=True)
+    (found,), steps = descend(stage, np.eye(4)[None])
+    assert stage.growth == pytest.approx(grown, abs=1e-9)
+    assert np.abs(found - G).max() < 1e-9
+    assert all(step.increment.shape == (7,) for step in steps)
+
+
+def test_what_may_not_grow_does_not():
+    stage = box_stage(np.eye(4), 1.03)
+    _, steps = descend(stage, np.eye(4)[None])
+    assert stage.growth == 1
+    assert all(step.increment.shape == (6,) for step in steps)
+    assert stage.rmse > 1e-3
+
+
+@pytest.mark.parametrize("free", ["levelled", "rx ry", "rz x", "yaw", "translation"])
+@pytest.mark.parametrize("grows", [False, True])
+def test_the_last_level_stays_among_what_is_allowed(rng, any_motion, free, grows):
+    allowed = Allowed(fa.Dof(free), any_motion(rng, 1.0), any_motion(rng, 1.0), inverted=False)
+    (start,) = allowed.nearest(np.eye(4)[None])
+    stage = box_stage(start, 1.02 if grows else 1.0, allowed=allowed, grows=grows)
+    off = allowed.twists(start[None])[0] @ (0.01 * rng.normal(size=6))
+    (found,), _ = descend(stage, allowed.nearest(exp_twist(off)[None] @ start))
+    assert np.abs(allowed.grown(stage.growth).nearest(found[None]) - found).max() < 1e-12
+    assert grows or np.abs(found - start).max() < 1e-9
+
+
+@pytest.mark.parametrize("free", ["levelled", "rx ry", "rz x", "yaw", "translation", "rx ry rz x y z"])
+@pytest.mark.parametrize("growth", [1.0, 1.3])
+def test_the_basis_says_what_a_pose_and_a_growth_may_do(rng, any_motion, free, growth):
+    """A step of e along it, the twist and then the growth, is allowed to e^2; there is one more than what is free."""
+    allowed = Allowed(fa.Dof(free), any_motion(rng, 1.0), any_motion(rng, 1.0), inverted=False)
+    stage = box_stage(np.eye(4), allowed=allowed, grows=True)
+    stage.growth = growth
+    (G,) = allowed.grown(growth).nearest(any_motion(rng, 1.0)[None])
+    basis = stage.basis(G[None])
+    assert basis.shape == (7, 7)
+    assert np.linalg.matrix_rank(basis, tol=1e-6) == len(fa.Dof(free).free) + 1
+    for e in (1e-3, 1e-5):
+        x = e * basis @ rng.normal(size=7)
+        moved = exp_twist(x[:6]) @ G
+        moved[:3, 3] *= np.exp(x[6])
+        (nearest,) = allowed.grown(growth * np.exp(x[6])).nearest(moved[None])
+        assert np.abs(nearest - moved).max() < 300 * e**2 + 1e-13
+
+
+def test_with_all_free_the_basis_is_all():
+    assert np.array_equal(box_stage(np.eye(4)).basis(np.eye(4)[None]), np.eye(7)[:, :6])
+    assert np.array_equal(box_stage(np.eye(4), grows=True).basis(np.eye(4)[None]), np.eye(7))

@@ -4,8 +4,12 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
+import trimesh
 
 import fieldalign as fa
+from fieldalign.clouds.simulated import simulate_pair
+from fieldalign.fields import spread_over
+from fieldalign.motions import apply, exp_twist
 
 METHODS = {
     "robust": {},
@@ -15,6 +19,14 @@ METHODS = {
     "object": {"method": "paper", "settings": "object"},
     "indoor-dense": {"method": "paper", "settings": "indoor-dense"},
     "keypoints": {"method": "paper", "settings": fa.Settings("keypoints", sigma=0.3)},
+}
+FREEDOMS = {
+    "levelled": {"dof": "levelled"},
+    "levelled, from a guess": {"dof": "levelled", "init": np.eye(4)},
+    "about a tilted axis": {"dof": fa.Dof("rz x y", axis=[0.1, -0.2, 1], centre=[1, 2, 3])},
+    "levelled, by the paper": {"dof": "levelled", "method": "paper"},
+    "scale, from a guess": {"scale": True, "init": np.eye(4)},
+    "levelled with a scale, from a guess": {"scale": True, "dof": "levelled", "init": np.eye(4)},
 }
 
 
@@ -49,6 +61,61 @@ def test_repeated_and_prepared(register, scans):
         assert bits(register(source, target)) == first
         assert bits(register(source, prepared)) == first
         assert bits(register(fa.prepare(source), prepared)) == first
+
+
+@pytest.mark.parametrize("options", FREEDOMS.values(), ids=FREEDOMS)
+def test_other_freedoms_at_any_number_of_threads_repeated_and_prepared(smaller_scans, options):
+    source, target, _ = smaller_scans
+    one, prepared = bits(fa.register(source, target, **options, threads=1)), fa.prepare(target)
+    for threads in (2, 3, 8):
+        assert bits(fa.register(source, prepared, **options, threads=threads)) == one
+    assert bits(fa.register(fa.prepare(source), target, **options)) == one
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("dof", "numbers"), [(None, (8,)), ("levelled", (2, 3))])
+def test_a_scale_that_is_sought(dof, numbers):
+    pair = simulate_pair(3, 3000)
+    source, target = 0.2 * pair.source.points, fa.prepare(pair.target)
+    one = bits(fa.register(source, target, scale=True, dof=dof, threads=1))
+    for threads in numbers:
+        assert bits(fa.register(source, target, scale=True, dof=dof, threads=threads)) == one
+
+
+def solid(x):
+    """The distance to two boxes and a ball, of which no turn makes the same."""
+    found = [np.linalg.norm(x - [-0.8, -0.3, 0.4], axis=-1) - 0.35]
+    for centre, half in (([0, 0, 0], [1, 0.6, 0.3]), ([0.5, 0.2, 0.6], [0.25, 0.3, 0.45])):
+        outside = np.abs(x - np.array(centre)) - half
+        found.append(np.linalg.norm(np.maximum(outside, 0), axis=-1) + np.minimum(outside.max(axis=-1), 0))
+    return np.min(found, axis=0)
+
+
+def exact_target(kind):
+    """A solid as a field, each time another object."""
+    if kind == "formula":
+        return fa.fields.CallableField(solid, [[-1.5] * 3, [1.5] * 3])
+    if kind == "volume":
+        nodes = np.stack(np.meshgrid(*3 * [np.linspace(-1.5, 1.5, 48)], indexing="ij"), axis=-1)
+        return fa.fields.VolumeField(solid(nodes), np.full(3, -1.5), 3 / 47)
+    pytest.importorskip("igl")
+    boxes = [trimesh.creation.box(size) for size in ([2, 1.2, 0.6], [0.5, 0.6, 0.9])]
+    ball = trimesh.creation.icosphere(2, 0.35)
+    boxes[1].apply_translation([0.5, 0.2, 0.6])
+    ball.apply_translation([-0.8, -0.3, 0.4])
+    whole = trimesh.util.concatenate([*boxes, ball])
+    return fa.fields.MeshField(np.asarray(whole.vertices), np.asarray(whole.faces))
+
+
+@pytest.mark.parametrize("kind", ["mesh", "volume", "formula"])
+@pytest.mark.parametrize("options", [{}, {"dof": "levelled"}, {"scale": True, "init": np.eye(4)}],
+                         ids=["all free", "levelled", "scale"])
+def test_surfaces_that_are_known_exactly(kind, options):
+    T = exp_twist(np.array([0, 0, 0.1, 0.05, 0.1, 0.02]))
+    points = apply(T, spread_over(exact_target("formula"), 2500))
+    one = bits(fa.register(points, exact_target(kind), threads=1, **options))
+    for threads in (2, 8):
+        assert bits(fa.register(points, exact_target(kind), threads=threads, **options)) == one
 
 
 def test_what_a_cloud_was_used_for_before_leaves_no_trace(register, scans, corner):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import fieldalign as fa
-from fieldalign.motions import apply, exp_twist, inverse, translation
+from fieldalign.motions import apply, exp_twist, growth, inverse, translation
 
 INDOOR = fa.PRESETS["indoor"]
 by_paper = partial(fa.register, method="paper")
@@ -84,6 +84,65 @@ def test_shifted_worlds_are_thinned_alike(scans):
     after = fa.register(source + here, target + there).T_target_source
     again = apply(inverse(translation(there)) @ after @ translation(here), source)
     assert np.abs(again - apply(before, source)).max() < 1e-9 * extent(source)
+
+
+# ------------------------------------------------------------------------------------------------- with other freedoms
+
+
+@pytest.fixture(params=["levelled", "rz x z", "rotation"])
+def freed(request, smaller_scans):
+    """Source, target, and a dof that allows the motion between them."""
+    source, target, truth = smaller_scans
+    dof = fa.Dof(request.param, axis=[0.2, -0.1, 1], centre=[1.0, 0.5, 2])
+    D = exp_twist(np.r_[np.array([0.3, -0.2, 0.5]) * dof.mask[:3], 0, 0, 0])
+    D[:3, 3] = np.array([2.0, -1, 0.5]) * dof.mask[3:]
+    T = dof.frame @ D @ inverse(dof.frame)
+    return apply(inverse(T) @ truth, source), target, dof
+
+
+@pytest.mark.parametrize("factor", [1000.0, 1e-3, 0.3048])
+def test_no_unit_has_to_be_said_with_a_dof(freed, factor):
+    """Its centre is given in the unit, too."""
+    source, target, dof = freed
+    before = fa.register(source, target, dof=dof)
+    after = fa.register(factor * source, factor * target, dof=fa.Dof(dof.free, dof.axis, factor * dof.centre))
+    assert np.abs(after.T_target_source[:3, :3] - before.T_target_source[:3, :3]).max() < 1e-6
+    shift = after.T_target_source[:3, 3] / factor
+    assert np.abs(shift - before.T_target_source[:3, 3]).max() < 1e-6 * extent(source)
+    assert after.reason is before.reason
+
+
+@pytest.mark.parametrize("factor", [1000.0, 0.3048])
+@pytest.mark.parametrize("dof", [None, "levelled"])
+def test_no_unit_has_to_be_said_with_a_scale(smaller_scans, dof, factor):
+    """Nor the same one for both: the source's is another."""
+    source, target, init = smaller_scans
+    options = {"scale": True, "dof": dof}
+    before = fa.register(source, target, init=init, **options)
+    after = fa.register(source / factor, 3 * target, init=growth(3) @ init @ growth(factor), **options)
+    there = growth(1 / 3) @ after.T_target_source @ growth(1 / factor)
+    assert np.abs(there[:3, :3] - before.T_target_source[:3, :3]).max() < 1e-6
+    assert np.abs(there[:3, 3] - before.T_target_source[:3, 3]).max() < 1e-6 * extent(source)
+    assert after.reason is before.reason
+    assert np.allclose(after.covariance[6, 6], before.covariance[6, 6], rtol=0.01)
+
+
+def test_where_the_world_is_shifted_the_dof_goes_with_it(freed):
+    (source, target, dof), far = freed, translation([100.0, 200, 300])
+    before = fa.register(source, target, dof=dof).T_target_source
+    shifted = fa.Dof(dof.free, dof.axis, dof.centre + far[:3, 3])
+    moved = fa.register(apply(far, source), apply(far, target), dof=shifted)
+    again = apply(inverse(far) @ moved.T_target_source @ far, source)
+    assert np.abs(again - apply(before, source)).max() < 1e-9 * extent(source)
+
+
+def test_either_world_may_be_shifted_with_a_scale(smaller_scans):
+    source, target, init = smaller_scans
+    here, there = translation([3.0, -20, 5]), translation([100.0, 200, 300])
+    before = fa.register(source, target, scale=True, init=init).T_target_source
+    after = fa.register(apply(here, source), apply(there, target), scale=True, init=there @ init @ inverse(here))
+    again = inverse(there) @ after.T_target_source @ here
+    assert np.abs(again - before).max() < 1e-9 * extent(source)
 
 
 def centroid_guess(source: np.ndarray, target: np.ndarray) -> np.ndarray:

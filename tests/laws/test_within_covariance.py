@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import fieldalign as fa
-from fieldalign.motions import apply, inverse, translation
+from fieldalign.motions import apply, exp_twist, inverse, translation
 
 UTM = translation([5e6, 4e5, 100])
 
@@ -49,3 +49,47 @@ def test_any_pose_of_either_world(scans, within_three_sigma, any_motion, seed):
     W_source, W_target = any_motion(rng, 20.0), any_motion(rng, 20.0)
     moved = fa.register(apply(W_source, source), apply(W_target, target), seed=seed).T_target_source
     assert within_three_sigma(fa.register(source, target), inverse(W_target) @ moved @ W_source)
+
+
+# ------------------------------------------------------------------------------------------------- with other freedoms
+
+
+@pytest.fixture(params=[{"dof": "levelled"}, {"dof": "levelled", "method": "paper"}, {"scale": True},
+                        {"scale": True, "dof": "levelled"}], ids=lambda options: ", ".join(map(str, options.values())))
+def levelled(request, smaller_scans):
+    """Registration with fewer freedoms, or more, from a guess that is not tilted; and scans that are levelled."""
+    source, target, T = smaller_scans
+    source, guess = apply(T, source), exp_twist(np.array([0, 0, 0.02, 0.05, 0.03, 0.01]))
+
+    def register(source, target, init=guess):
+        return fa.register(source, target, init=init, **request.param)
+
+    return register, source, target, guess
+
+
+def test_swapped_clouds_give_the_inverse_with_other_freedoms(levelled, within_three_sigma):
+    register, source, target, guess = levelled
+    there, back = register(source, target), register(target, source, inverse(guess))
+    assert within_three_sigma(there, np.linalg.inv(back.T_target_source))
+
+
+def test_permuted_points_with_other_freedoms(levelled, within_three_sigma, rng):
+    register, source, target, _ = levelled
+    permuted = register(rng.permutation(source), rng.permutation(target))
+    assert within_three_sigma(register(source, target), permuted.T_target_source)
+
+
+def test_duplicated_points_with_other_freedoms(levelled, within_three_sigma):
+    register, source, target, _ = levelled
+    doubled = register(np.vstack([source, source]), np.vstack([target, target]))
+    assert within_three_sigma(register(source, target), doubled.T_target_source)
+
+
+def test_turned_worlds_with_an_axis_that_turns_along(levelled, any_motion, within_three_sigma, rng):
+    """Levelled about what was up before."""
+    _, source, target, guess = levelled
+    W, V = any_motion(rng, 5.0), any_motion(rng, 5.0)
+    before = fa.register(source, target, dof="levelled", init=guess)
+    dof = fa.Dof("levelled", axis=W[:3, 2], centre=W[:3, 3])
+    after = fa.register(apply(V, source), apply(W, target), dof=dof, init=W @ guess @ inverse(V))
+    assert within_three_sigma(before, inverse(W) @ after.T_target_source @ V)

@@ -109,6 +109,7 @@ class FieldStage:
         self.hold: Floats = np.zeros((7, 7))
         self.scatter: Floats = np.zeros((7, 7))
         self.totals: Floats = np.zeros(4)
+        self.gradient: Floats = np.zeros(7)
         self.increment: Floats = np.zeros(7)
         self.take(np.inf, 1, 0.0)
 
@@ -131,7 +132,7 @@ class FieldStage:
             x, normals, self.partners.mean - self.centre, self.partners.normal, _spread(self.taken, self.partners),
             MIN_COSINE, self.reach, self.deviations, least_scale,
         )
-        self.H, self.totals = H[0], totals[0]
+        self.H, self.gradient, self.totals = H[0], g[0], totals[0]
         # Far from the end the scale shrinks with the residuals, and a longer step would leap over the end for ever.
         turns_back = g[0] @ self.increment > 0
         stretch = np.ones(1) if turns_back else _stretch(totals)
@@ -143,15 +144,8 @@ class FieldStage:
         return poses, Step(self.increment[: 6 + self.grows], self.rmse, int(self.totals[3]))
 
     def basis(self, poses: Floats) -> Floats:
-        """What the pose may do, in columns (7, m): twists on its left, and the growth about the centre of the dof."""
-        basis = np.eye(7)[:, : 6 + self.grows]
-        if self.allowed is None:
-            return basis
-        allowed = self.allowed.grown(self.growth) if self.grows else self.allowed
-        basis[:6, :6] = allowed.twists(poses)[0]
-        if self.grows:
-            basis[3:6, 6] = -allowed.centres(poses)[0]
-        return basis
+        """What the pose may do in a step, as free_twists() has it."""
+        return free_twists(self.allowed, poses, self.growth if self.grows else None)
 
     def _grown(self, poses: Floats, H: Floats, g: Floats, stretch: Floats) -> Floats:
         """The poses (1, 4, 4) after a step of seven freedoms; what moves has grown by the seventh."""
@@ -168,15 +162,13 @@ class FieldStage:
     def _moved(self, G: Floats) -> Floats:
         return apply(G, self.taken.mean if self.growth == 1 else self.growth * self.taken.mean)
 
-    def misfit(self, G: Floats, within: float) -> float:
-        """The mean squared residual over the square of a length, 0 to 1: 1 of pseudo points further off, and of those
-        whose normals do not agree."""
+    def distances(self, G: Floats) -> Floats:
+        """From the pseudo points to the other surface's planes (L,); infinite where no plane nearby agrees."""
         x, normals = self._moved(G), rotate(G[:3, :3], self.taken.normal)
         partners = planes_near(self.field, x + self.centre, self.neighbours)
         away = x + self.centre - partners.mean
         is_on = (row_dot(away, away) <= self.reach**2) & (np.abs(row_dot(normals, partners.normal)) >= MIN_COSINE)
-        squares = np.minimum((row_dot(away, partners.normal) / within) ** 2, 1)
-        return float(np.where(is_on, squares, 1.0).mean())
+        return np.where(is_on, np.abs(row_dot(away, partners.normal)), np.inf)
 
     def overlap(self, G: Floats) -> Floats:
         """Centroid (3,) of the pseudo points that have a partner; of all where none has."""
@@ -216,6 +208,20 @@ class FieldStage:
         moved = reach_of(step.increment, self.extent)
         open_by = step.cost / np.sqrt(max(step.kept, 1))
         return bool(moved <= max(self.patience * open_by, 1e-14 * self.extent))
+
+
+def free_twists(allowed: Allowed | None, poses: Floats, growth: float | None) -> Floats:
+    """What a pose (1, 4, 4) may do, in columns (7, m): twists on its left, and, unless the growth so far is None, the
+    growth about the centre of the dof."""
+    if allowed is None:
+        return np.eye(7)[:, : 6 if growth is None else 7]
+    allowed = allowed if growth is None else allowed.grown(growth)
+    twists = allowed.twists(poses)[0]
+    basis = np.concatenate([twists, np.zeros((1, twists.shape[1]))])
+    if growth is None:
+        return basis
+    growing = np.r_[np.zeros(3), -allowed.centres(poses)[0], 1.0]
+    return np.concatenate([basis, growing[:, None]], axis=1)
 
 
 def _spread(own: Planes, other: Planes) -> Floats:

@@ -18,6 +18,7 @@ CLEARLY_OTHER = Apart(0.966, 5.0)  # 15 degrees, or voxels
 RIVAL = 0.9               # of the best score: a pose that the data cannot tell from it
 
 
+_NEARLY_ALL = 0.95
 _FINE_RIVALS = 3          # that are compared at the scale of the noise, where surfaces are known exactly
 
 
@@ -40,14 +41,23 @@ class Contest:
     def at_the_noise(self, refined: Refined, pair: Pair) -> float:
         """By what factor the squared residuals are smaller, seen at the scale of the noise, than in the best clearly
         different poses, refined. A smooth part agrees coarsely with itself in many poses, but exactly in one."""
-        within = refined.last.scale / 2
+        own = refined.last.distances(refined.G)
+        near = own[np.isfinite(own)]
+        if not len(near):
+            return 0.0
+        # Three deviations; or what nearly all keep to, where most of a surface is met much better than the rest.
+        within = max(refined.last.scale / 2, float(np.quantile(near, _NEARLY_ALL)), 1e-300)
+
+        def misfit(distances: Floats) -> float:
+            return float((np.minimum(distances / within, 1.0) ** 2).mean())
+
         other = 1.0
         is_other = CLEARLY_OTHER.differ(self.poses, refined.G, pair.middle, pair.voxel)
         for G in self.poses[is_other][np.argsort(-self.scores[is_other], kind="stable")][:_FINE_RIVALS]:
             rival = sketch(pair, G)
             if CLEARLY_OTHER.differ(rival.G[None], refined.G, pair.middle, pair.voxel)[0]:
-                other = min(other, rival.last.misfit(rival.G, within))
-        return other / max(refined.last.misfit(refined.G, within), 1e-12)
+                other = min(other, misfit(rival.last.distances(rival.G)))
+        return other / max(misfit(own), 1e-12)
 
 
 def judged(pair: Pair, refined: list[Refined], contest: Contest, threads: int) -> list[RegistrationResult]:
@@ -73,7 +83,7 @@ def _result(
     T, last, (there, back) = pair.motion(refined.G), refined.last, ways
     known, _ = certainty(pair, refined)
     margin = contest.margin(refined.G, float(mutual_score(there, back)[0]), pair)
-    if margin < MIN_MARGIN and not pair.held.is_points and last.scale > 0:
+    if margin < MIN_MARGIN and not pair.held.is_points:
         margin = max(margin, contest.at_the_noise(refined, pair))
     evidence = Evidence(
         met=float(max(there.met[0], back.met[0])),

@@ -109,6 +109,6 @@ class Pair:
         rigid = guess @ growth(1 / size)
         centre = self.source.centre / self.source.factor
         if self.dof is not None:
-            centre = apply(inverse(rigid), self.dof.frame[None, :3, 3])[0] / size
+            centre = apply(inverse(rigid), self.dof.about(self.surfaces()[0].origin).frame[None, :3, 3])[0] / size
         rigid[:3, 3] += rigid[:3, :3] @ ((size - self.source.factor) * centre)
         return rigid

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..alignment import Step, descend
 from ..alignment.copies import meet
-from ..alignment.robust import FieldStage
+from ..alignment.robust import FieldStage, free_twists
 from ..dof import Allowed, Remaining
 from ..fields import PointField
 from ..fields.protocol import Floats, planes_near
@@ -133,6 +133,9 @@ def certainty(pair: Pair, refined: Refined) -> tuple[Certainty, Floats]:
     seen = seen_from(rigid, 1 / last.growth, centre - held.origin)[:n, :n]
     A, S, hold = (seen.T @ M[:n, :n] @ seen for M in (last.curvature, last.gradient_scatter, last.hold))
     hidden = _HIDDEN * (1 + (last.roughness / _ROUGH) ** 2) if pair.held.is_points else 1.0
-    free = None if pair.allowed is None else np.asarray(np.linalg.solve(seen, last.basis(refined.G[None])[:n]), float)
+    free = None
+    if pair.allowed is not None:
+        free = free_twists(pair.allowed, refined.G[None], last.growth if pair.grows else None)[:n]
+        free = np.asarray(np.linalg.solve(seen, free), float)
     known = split(A, hidden * S, hold, apply(rigid, centre[None])[0], last.extent / 4, MIN_HOLD, free)
     return known, seen

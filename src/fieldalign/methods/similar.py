@@ -28,7 +28,7 @@ def register_similar(
     """From any pose and any size within a factor of two of what the surfaces suggest, or from a guess, to a result."""
     if start.init is not None and not start.searches:
         return register_robust(ScaledCloud(source, size_of(start.init)), target, start, seed, threads, clock)
-    middle = _own_size(target) / _own_size(source) if start.init is None else size_of(start.init)
+    middle = _ratio(source, target) if start.init is None else size_of(start.init)
     steps = np.arange(-_OCTAVES * _STEPS, _OCTAVES * _STEPS + 1)
     sizes = middle * 2 ** (steps / _STEPS)
     voxel = common_voxel(source.scale.scaled(middle), target.scale)
@@ -47,5 +47,7 @@ def register_similar(
     return register_robust(ScaledCloud(source, sizes[best]), target, start, seed, threads, clock, float(other))
 
 
-def _own_size(cloud: PreparedCloud) -> float:
-    return cloud.surface(cloud.scale.voxel).size
+def _ratio(source: PreparedCloud, target: PreparedCloud) -> float:
+    """How much larger the target's surface is than the source's."""
+    sizes = [cloud.surface(cloud.scale.voxel).size for cloud in (source, target)]
+    return sizes[1] / sizes[0] if min(sizes) > 0 else target.extent / source.extent

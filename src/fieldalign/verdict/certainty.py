@@ -70,8 +70,9 @@ def split(
     """
     n = len(hold)
     if not (all(np.isfinite(M).all() for M in (curvature, scatter, hold)) and hold.any() and length > 0):
+        everything = np.eye(n) if free is None else _span(free)
         return Certainty(
-            np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, 0)), np.eye(n), reference, np.zeros(n), 1.0
+            np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, 0)), everything, reference, np.zeros(n), 1.0
         )
     lever = _lever(n, length)
     scale = lever * lever.T
@@ -98,8 +99,9 @@ def _lever(n: int, length: float) -> Floats:
 
 def _span(columns: Floats) -> Floats:
     """An orthonormal basis of what the columns span."""
-    left, sizes, _ = np.linalg.svd(columns, full_matrices=False)
-    return left[:, sizes > 1e-9 * sizes[0]]
+    lengths = np.linalg.norm(columns, axis=0)
+    left, sizes, _ = np.linalg.svd(columns[:, lengths > 0] / lengths[lengths > 0], full_matrices=False)
+    return np.asarray(left[:, sizes > 1e-9 * sizes[0]])
 
 
 def freedoms(known: Certainty) -> tuple[Freedom, ...]:

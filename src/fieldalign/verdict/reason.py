@@ -15,6 +15,7 @@ class Reason(Enum):
     AMBIGUOUS = "ambiguous"
     DEGENERATE = "degenerate"
     NOT_CONVERGED = "not_converged"
+    FAILED = "failed"
 
     def __str__(self) -> str:
         return _SENTENCES[self]
@@ -35,4 +36,5 @@ _SENTENCES = {
     Reason.DEGENERATE: "Not accepted: the clouds may slide or turn on each other without a difference; that part of "
     "the motion is the guess's, or arbitrary without one.",
     Reason.NOT_CONVERGED: "Not accepted: the surfaces agree better a step further, so the pose is not exact.",
+    Reason.FAILED: "Not accepted: there is no pose, since a cloud cannot be read or the work on the pair went wrong.",
 }

@@ -1,0 +1,1 @@
+"""Many scans: work that outlasts one machine, and what it leaves behind."""

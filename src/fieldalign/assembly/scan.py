@@ -1,0 +1,65 @@
+"""A scan as the assembly keeps it: thinned while it is read, so that no two whole ones are ever in memory."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..fields import PointField
+from ..fields.protocol import Floats
+from ..lazy import lazy
+from ..prepare import CloudLike, prepare_named
+from ..prepared import PreparedCloud
+from ..whole_file import replacing
+
+
+@dataclass(frozen=True, eq=False)
+class ThinScan:
+    """points: (n, 3), at most some fifty thousand, in the scan's own frame. eye: (3,), where the sensor stood, or None.
+    voxel, extent: its own, lengths. dropped: missing returns (NaN) that were left out."""
+
+    points: Floats
+    eye: Floats | None
+    voxel: float
+    extent: float
+    dropped: int
+
+    @lazy
+    def cloud(self) -> PreparedCloud:
+        """Ready for registration; made where it is asked for, and not sent along."""
+        return PreparedCloud(PointField(self.points, threads=1), self.dropped, 1, self.eye)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if name != "cloud"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+
+
+def thinned(cloud: CloudLike, name: str, threads: int) -> ThinScan:
+    """A scan of any size, or the surface of a field, as few points as a registration can use.
+
+    Raises what prepare() raises, in the name of the scan.
+    """
+    prepared = prepare_named(cloud, name, threads, drop_nonfinite=True)
+    assert isinstance(prepared, PreparedCloud)
+    points = np.asarray(prepared.fine.points, float)
+    return ThinScan(points, prepared.eye, prepared.scale.voxel, prepared.extent, prepared.dropped)
+
+
+def write_scan(path: Path, scan: ThinScan) -> None:
+    """Keeps a scan in a file (.npz), whole or not at all."""
+    eye = np.empty(0) if scan.eye is None else scan.eye
+    with replacing(path) as unfinished, unfinished.open("wb") as file:
+        np.savez(file, points=scan.points, eye=eye, lengths=[scan.voxel, scan.extent], dropped=scan.dropped)
+
+
+def read_scan(path: Path) -> ThinScan:
+    """The scan that write_scan() kept."""
+    with np.load(path, allow_pickle=False) as arrays:
+        eye = arrays["eye"] if arrays["eye"].size else None
+        voxel, extent = arrays["lengths"].tolist()
+        return ThinScan(arrays["points"], eye, voxel, extent, int(arrays["dropped"]))

@@ -1,0 +1,79 @@
+"""The frame of a component: that of its first scan, or the world of poses that are known beforehand."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..dof import Dof, allowed_poses
+from ..fields.protocol import Floats
+from ..motions import inverse, nearest_rotation
+from .pose_graph import Anchors
+
+_ROUGH_TURN = 0.5  # rad: of poses that are known no better, only the places are
+
+
+@dataclass(frozen=True, eq=False)
+class Given:
+    """Poses (4, 4) that are known beforehand, world_from_cloud, or None; sigma: (rad, length), how well, or None: they
+    are a guess; fixed: indices of those that do not change."""
+
+    poses: list[Floats | None]
+    sigma: tuple[float, float] | None
+    fixed: tuple[int, ...]
+    is_rough: bool = True  # so that other poses nearby are searched, too
+
+    @property
+    def is_useful(self) -> bool:
+        """Whether they tell which scans are near each other."""
+        return sum(pose is not None for pose in self.poses) > len(self.poses) / 2
+
+    def between(self, i: int, j: int) -> Floats | None:
+        """A guess (4, 4) of the pose of scan j in the frame of scan i, if both are known well enough."""
+        one, other = self.poses[i], self.poses[j]
+        if one is None or other is None or (self.sigma is not None and self.sigma[0] > _ROUGH_TURN):
+            return None
+        return inverse(one) @ other
+
+
+def anchored(poses: Floats, members: Sequence[int], given: Given, dof: Dof | None) -> tuple[Floats, Anchors]:
+    """The poses (n, 4, 4) of a component's scans in its world, and what holds them there."""
+    row_of = {k: row for row, k in enumerate(members) if given.poses[k] is not None}
+    fixed = [row_of[k] for k in given.fixed if k in row_of]
+    priors = {}
+    if given.sigma is not None:
+        turn, shift = given.sigma
+        information = np.diag([turn**-2.0] * 3 + [shift**-2.0] * 3)
+        priors = {row: (np.asarray(given.poses[k]), information) for k, row in row_of.items() if row not in fixed}
+    poses = _world(poses, members, given, row_of, fixed) @ poses
+    if not fixed and not priors:
+        fixed = [next(iter(row_of.values()), 0)]
+    for row in fixed:
+        if given.poses[members[row]] is not None:
+            poses[row] = given.poses[members[row]]
+    allowed = None if dof is None else allowed_poses(dof, None, np.zeros(3), np.zeros(3), target_is_held=True)
+    return poses, Anchors(fixed, priors, allowed)
+
+
+def _world(
+    poses: Floats, members: Sequence[int], given: Given, row_of: dict[int, int], fixed: Sequence[int]
+) -> Floats:
+    """What takes the frame of the component's poses into the world (4, 4)."""
+    if not row_of:
+        return inverse(poses[0])
+    rows = list(row_of.values())
+    there = np.stack([np.asarray(given.poses[members[row]]) for row in rows])
+    if not fixed and given.sigma is not None and given.sigma[0] > _ROUGH_TURN and len(rows) > 2:
+        return _between(poses[rows, :3, 3], there[:, :3, 3])
+    first = fixed[0] if fixed else rows[0]
+    return np.asarray(given.poses[members[first]]) @ inverse(poses[first])
+
+
+def _between(places: Floats, onto: Floats) -> Floats:
+    """The motion (4, 4) that lays places (n, 3) on others with the least sum of squares (Kabsch, Acta Cryst. 1976)."""
+    W = np.eye(4)
+    W[:3, :3] = nearest_rotation((onto - onto.mean(axis=0)).T @ (places - places.mean(axis=0)))
+    W[:3, 3] = onto.mean(axis=0) - W[:3, :3] @ places.mean(axis=0)
+    return W
