@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -88,10 +88,25 @@ def _given(
     if sigma is not None:
         if poses is None:
             raise ArgumentError("pose_sigma says how well poses are known, but there are none")
-        for value in sigma:
-            check_positive("pose_sigma", value)
-    for k in fixed:
-        if not 0 <= k < count or known[k] is None:
-            raise ArgumentError(f"fixed must name clouds whose pose is given, but names {k!r}")
+        sigma = _sigma(sigma)
     rigid = [None if T is None else as_rigid(T, f"poses[{k}]") for k, T in enumerate(known)]
-    return Given(rigid, None if sigma is None else (float(np.radians(sigma[0])), float(sigma[1])), tuple(fixed))
+    return Given(rigid, sigma, _fixed(fixed, known))
+
+
+def _sigma(sigma: Any) -> tuple[float, float]:
+    """In radians and a length."""
+    try:
+        turn, shift = sigma
+    except (TypeError, ValueError):
+        raise ArgumentError(f"pose_sigma must be (degrees, length), but is {sigma!r}") from None
+    for value in (turn, shift):
+        check_positive("pose_sigma", value)
+    return float(np.radians(turn)), float(shift)
+
+
+def _fixed(fixed: Any, known: Sequence[Any]) -> tuple[int, ...]:
+    may = {k for k, pose in enumerate(known) if pose is not None}
+    wrong = [k for k in fixed if k not in may] if isinstance(fixed, Iterable) else [fixed]
+    if wrong:
+        raise ArgumentError(f"fixed must be indices of clouds whose pose is given, but holds {wrong[0]!r}")
+    return tuple(int(k) for k in fixed)

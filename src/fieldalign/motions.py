@@ -33,11 +33,16 @@ def log_motion(T: Matrix) -> Matrix:
         axis = symmetric[np.argmax(np.diag(symmetric))]
         axis = axis / np.linalg.norm(axis)
         w = axis * (angle if axis @ axial >= 0 else -angle)
-    # v solves V v = t, where V is the left Jacobian of w (Barfoot, State Estimation for Robotics, 7.1.3).
-    K = np.cross(np.eye(3), w)
+    return np.concatenate([w, left_jacobian_inverse(w) @ t])
+
+
+def left_jacobian_inverse(w: Matrix) -> Matrix:
+    """(3, 3): by what the rotation vector w (3,) changes when Exp(w) is turned a little on its left (Barfoot, State
+    Estimation for Robotics, 7.1.3). It is also what makes v of a twist (w, v) from the shift of its motion."""
+    K, angle = np.cross(np.eye(3), w), float(np.linalg.norm(w))
     half = angle / 2
     share = 1 / 12 if angle < 1e-4 else (1 - half / np.tan(half)) / angle**2
-    return np.concatenate([w, t - K @ t / 2 + share * (K @ (K @ t))])
+    return np.asarray(np.eye(3) - K / 2 + share * (K @ K))
 
 
 def inverse(T: Matrix) -> Matrix:

@@ -31,7 +31,7 @@ _TILE = 16          # scans on a side of a tile of glances
 _OVERLAP = 0.3      # of either scan: pairs that overlap so much, by their poses, are registered, too
 _NEIGHBOURS = 3     # of these, for each scan
 _ROUNDS = 3         # of the joint refinement
-_MODEL = 0.25       # of the median voxel: the thinning of a model
+_MODEL = 0.25       # of a component's median voxel: the thinning of its model
 
 
 def build(shop: Workshop, given: Given, ordered: bool, dof: Dof | None, seed: int) -> Assembly:
@@ -40,7 +40,7 @@ def build(shop: Workshop, given: Given, ordered: bool, dof: Dof | None, seed: in
     lengths, broken = shop.thin()
     clock.lap("read")
     known = np.array([k in lengths for k in range(len(shop.clouds))])
-    likeness = _near(given, lengths) if given.is_useful else _glances(shop, known, seed)
+    likeness = _near(given, lengths) if given.is_useful else _glances(shop, known, dof, seed)
     clock.lap("glance")
     graph = _Graph(lengths, len(known), seed)
     choice = Choice(likeness, ordered, known)
@@ -58,11 +58,10 @@ def build(shop: Workshop, given: Given, ordered: bool, dof: Dof | None, seed: in
         for row, scan in enumerate(members):
             poses[scan], covariances[scan] = placed[row], known_by[row]
     clock.lap("refine")
-    voxel = _MODEL * float(np.median([voxel for voxel, _ in lengths.values()])) if lengths else 0.0
-    models = [
-        fused(members, lambda k: read_scan(shop.path(k)), poses, voxel, shop.threads)
-        for members in graph.components
-    ]
+    models = []
+    for members in graph.components:
+        voxel = _MODEL * float(np.median([lengths[k][0] for k in members]))
+        models.append(fused(members, lambda k: read_scan(shop.path(k)), poses, voxel, shop.threads))
     clock.lap("fuse")
     return Assembly(
         poses, covariances, graph.components, graph.told(believed=True), graph.told(believed=False),
@@ -170,7 +169,7 @@ def _edge_of(i: int, j: int, result: PairResult) -> Edge:
     return Edge(i, j, result.T_target_source, result.information, result.reference_point, max(strength, 1e-3))
 
 
-def _glances(shop: Workshop, known: NDArray[np.bool_], seed: int) -> Floats:
+def _glances(shop: Workshop, known: NDArray[np.bool_], dof: Dof | None, seed: int) -> Floats:
     """The likeness (n, n) of scans, by a glance at each pair."""
     scans = np.flatnonzero(known)
     tiles = [scans[k : k + _TILE] for k in range(0, len(scans), _TILE)]
@@ -180,7 +179,7 @@ def _glances(shop: Workshop, known: NDArray[np.bool_], seed: int) -> Floats:
             names = [name_of(k) for k in rows], [name_of(k) for k in columns]
             tasks.append(Task(f"glance {names[0][0]} {names[1][0]}", tuple(sorted({*names[0], *names[1]})), names))
     likeness = np.zeros((len(known), len(known)))
-    found = shop.do("glancing", Glances(seed), tasks, plain=lambda scores: scores)
+    found = shop.do("glancing", Glances(seed, dof), tasks, plain=lambda scores: scores)
     for task in tasks:
         done = found[task.key]
         if done.error is None:
@@ -248,7 +247,7 @@ def _refined(
     """The poses (n, 4, 4) of a component's scans and their covariances (n, 6, 6)."""
     row = {scan: k for k, scan in enumerate(members)}
     edges = [replace(e, i=row[e.i], j=row[e.j]) for e in graph.believed(members)]
-    poses, anchors = anchored(graph.poses[members], members, given, dof)
+    world, poses, anchors = anchored(graph.poses[members], members, given, dof)
     poses = optimise(poses, edges, anchors)
     for _ in range(_ROUNDS):
         system = anchors.system(poses)
@@ -257,7 +256,11 @@ def _refined(
             system.add({edge.i: A_i, edge.j: A_j}, pull.H, pull.g)
         poses = anchors.moved(poses, system.step())
     final = [edge for edge, _ in _pulled(shop, members, poses, edges, both_ways=False)]
-    return poses, linearised(poses, final, anchors).covariances()
+    covariances = linearised(poses, final, anchors).covariances()
+    poses = world @ poses
+    for scan in set(given.fixed) & set(members):
+        poses[row[scan]] = given.poses[scan]  # to the last bit
+    return poses, covariances
 
 
 def _pulled(

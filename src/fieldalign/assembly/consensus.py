@@ -31,9 +31,9 @@ def consensus(count: int, edges: Sequence[Edge], voxels: Floats, extents: Floats
     voxels, more around longer cycles. Trees prefer strong edges, and are drawn by a seeded generator.
     """
     rng = np.random.default_rng(seed)
-    strength = np.array([edge.strength for edge in edges])
+    strength = np.array([edge.strength for edge in edges]) * (1 + _support(edges, voxels, extents)) ** 2
     best, best_score = None, -np.inf
-    for trial in range(_TREES if len(edges) >= count else 1):
+    for trial in range(_TREES):
         # The first tree is that of the strongest edges; the others are drawn, strong edges first as a rule.
         weight = strength if trial == 0 else strength ** rng.uniform(0, 1) * rng.exponential(size=len(edges))
         poses, depth = _along_tree(count, edges, weight)
@@ -41,10 +41,37 @@ def consensus(count: int, edges: Sequence[Edge], voxels: Floats, extents: Floats
         score = float((np.minimum(strength, 3 * np.median(strength)) * agrees).sum())
         if score > best_score + 1e-9:
             best, best_score = Consensus(poses, agrees), score
-        if agrees.all():
+        if agrees.all():  # as on a graph without cycles
             break
     assert best is not None
     return best
+
+
+def _support(edges: Sequence[Edge], voxels: Floats, extents: Floats) -> Floats:
+    """How many triangles each edge closes (m,) that return to where they began: a wrong edge closes hardly any."""
+    between = {frozenset((edge.i, edge.j)): k for k, edge in enumerate(edges)}
+    partners: dict[int, set[int]] = {}
+    for edge in edges:
+        partners.setdefault(edge.i, set()).add(edge.j)
+        partners.setdefault(edge.j, set()).add(edge.i)
+    support = np.zeros(len(edges))
+    for k, edge in enumerate(edges):
+        for third in partners[edge.i] & partners[edge.j]:
+            first, second = between[frozenset((edge.i, third))], between[frozenset((third, edge.j))]
+            path = _from_to(edges[first], edge.i) @ _from_to(edges[second], third)
+            error = edge.error_of(path)
+            support[k] += _size(error[None], extents[k : k + 1])[0] <= (_LOOSE + 2 * _PER_STEP) * voxels[k]
+    return support
+
+
+def _from_to(edge: Edge, scan: int) -> Floats:
+    """The other scan's pose in the frame of `scan`."""
+    return edge.T_ij if edge.i == scan else inverse(edge.T_ij)
+
+
+def _size(errors: Floats, extents: Floats) -> Floats:
+    """How far errors (m, 6) move the places of an overlap, at most (m,)."""
+    return np.asarray(np.linalg.norm(errors[:, 3:], axis=1) + np.linalg.norm(errors[:, :3], axis=1) * extents / 4)
 
 
 def _along_tree(count: int, edges: Sequence[Edge], weight: Floats) -> tuple[Floats, NDArray[np.int64]]:
@@ -71,6 +98,6 @@ def _agrees(
     edges: Sequence[Edge], poses: Floats, depth: NDArray[np.int64], voxels: Floats, extents: Floats
 ) -> NDArray[np.bool_]:
     errors = np.stack([edge.error(poses) for edge in edges])
-    off = np.linalg.norm(errors[:, 3:], axis=1) + np.linalg.norm(errors[:, :3], axis=1) * extents / 4
+    off = _size(errors, extents)
     length = np.array([depth[edge.i] + depth[edge.j] for edge in edges])
     return np.asarray(off <= voxels * (_LOOSE + _PER_STEP * length))

@@ -33,11 +33,12 @@ class Glances:
     """A glance at each pair of a tile: (rows, columns), names of scans."""
 
     seed: int
+    dof: Dof | None
 
     def __call__(self, tile: tuple[list[str], list[str]], load: Load) -> list[list[float]]:
         """The scores, row by row; 0 where the row's scan does not come before the column's."""
         rows, columns = tile
-        return [[glance(load(a), load(b), self.seed) if a < b else 0.0 for b in columns] for a in rows]
+        return [[glance(load(a), load(b), self.seed, self.dof) if a < b else 0.0 for b in columns] for a in rows]
 
 
 @dataclass(frozen=True)
