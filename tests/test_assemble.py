@@ -161,6 +161,39 @@ def test_processes_give_the_same_bits(levelled):
     assert bits(found) == bits(fa.assemble(clouds, executor=Serial(1)))
 
 
+# --------------------------------------------------------------------------------------------- places that look alike
+
+
+@pytest.fixture(scope="module")
+def twins():
+    """Two scans of each of two rooms of one size, which differ by what stands in them."""
+    size = np.array([6.0, 4.5, 2.7])
+    shell = [Box(tuple(size / 2 + (size / 2 + 0.05) * side), tuple(np.where(side, 0.1, size + 0.2)))
+             for side in np.vstack([np.eye(3), -np.eye(3)])]
+    built_in = [Box((1.5, 2.2, 2.55), (0.4, 4.5, 0.3)), Box((0.4, 0.4, 1.35), (0.8, 0.8, 2.7), yaw=0.4),
+                Box((5.6, 3.6, 1.1), (0.8, 1.8, 2.2)), Box((5.0, 0.5, 0.5), (1.6, 1.0, 1.0), yaw=0.2),
+                Box((2.5, 4.2, 1.0), (1.4, 0.5, 2.0)), Cylinder((0.7, 2.6, 0), (0.7, 2.6, 2.7), 0.25)]
+    built_in += [Sphere((4.3, 3.9, 0.5), 0.5), Box((0.3, 1.4, 1.6), (0.5, 0.9, 0.6), yaw=0.3)]
+    desks = [Box((1.4, 3.6, 0.3), (0.6, 0.6, 0.6))]
+    others = [Box((3.4, 0.6, 0.3), (0.6, 0.6, 0.6))]
+    return [cloud for things in (desks, others) for cloud, _ in scans_of(Scene((*shell, *built_in, *things)), size, 2)]
+
+
+def test_rooms_that_look_alike_are_told_apart_by_what_was_looked_through(twins):
+    """Who does not know where the sensors stood takes them for one."""
+    assert fa.assemble(twins, threads=1).components != [[0, 1], [2, 3]]
+    assert fa.assemble(twins, sensor_at_origin=True, threads=1).components == [[0, 1], [2, 3]]
+
+
+def test_a_viewpoint_says_where_the_sensor_stood(twins, any_motion):
+    rng = np.random.default_rng(8)
+    moved = []
+    for cloud in twins:
+        T = any_motion(rng, 4.0)
+        moved.append(fa.PointCloud(apply(T, cloud), viewpoint=T))
+    assert fa.assemble(moved, threads=1).components == [[0, 1], [2, 3]]
+
+
 # -------------------------------------------------------------------------------------------------- what can be told it
 
 

@@ -32,6 +32,7 @@ def assemble(
     pose_sigma: tuple[float, float] | None = None,
     fixed: Sequence[int] = (),
     ordered: bool = False,
+    sensor_at_origin: bool = False,
     dof: Any = None,
     executor: AnyExecutor = None,
     run_folder: str | os.PathLike[str] | None = None,
@@ -47,6 +48,9 @@ def assemble(
         they then also pull at the result, whose world is theirs.
     fixed: indices of scans whose given pose is not to change.
     ordered: successive scans are neighbours.
+    sensor_at_origin: each scan is in the frame of its own sensor, unless it has a viewpoint that says otherwise. Where
+        a sensor looked through what another scan shows, the two do not lie like that: so rooms that look alike are told
+        apart.
     dof: "levelled" (all scans know which way is up), "planar" or "translation": what their poses may differ by.
     executor, run_folder, threads: as in `fa.register_many`. The run folder also keeps the thinned scans.
     progress: called as progress(stage, finished, of).
@@ -72,8 +76,9 @@ def assemble(
     chosen, seed = as_executor(executor), as_count(seed, "seed", 0)
     used = chosen.threads if threads is None else resolve_threads(threads)
     settings = told({"seed": seed, "dof": freedoms, "poses": [None if T is None else T.tolist() for T in given.poses],
-                     "sigma": given.sigma, "fixed": given.fixed, "ordered": bool(ordered)})
-    with Workshop(clouds, chosen, run_folder, settings, progress, used) as shop:
+                     "sigma": given.sigma, "fixed": given.fixed, "ordered": bool(ordered),
+                     "sensor_at_origin": bool(sensor_at_origin)})
+    with Workshop(clouds, chosen, run_folder, settings, progress, used, bool(sensor_at_origin)) as shop:
         return build(shop, given, bool(ordered), freedoms, seed)
 
 

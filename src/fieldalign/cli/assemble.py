@@ -31,6 +31,7 @@ from .files import check_folder, write_text
 @click.option("--sigma", type=(float, float), metavar="DEGREES LENGTH", help="How well --poses are known.")
 @click.option("--fixed", multiple=True, metavar="SCAN", help="A scan of --poses that is not to move.")
 @click.option("--ordered", is_flag=True, help="Successive scans are neighbours.")
+@click.option("--sensor-at-origin", is_flag=True, help="Each scan is in the frame of its own sensor.")
 @click.option("--dof", type=click.Choice(["levelled", "planar", "translation"]), help="What the poses may differ by.")
 @executor_options
 def command(
@@ -43,6 +44,7 @@ def command(
     sigma: tuple[float, float] | None,
     fixed: tuple[str, ...],
     ordered: bool,
+    sensor_at_origin: bool,
     dof: str | None,
     run_folder: str | None,
     workers: int | None,
@@ -61,7 +63,8 @@ def command(
     with bar() as progress:
         found = fa.assemble(
             list(scans), poses=known, pose_sigma=sigma, fixed=[_index(name, scans) for name in fixed], ordered=ordered,
-            dof=dof, executor=chosen_executor(workers, dask), run_folder=run_folder, progress=progress, seed=seed,
+            sensor_at_origin=sensor_at_origin, dof=dof, executor=chosen_executor(workers, dask), run_folder=run_folder,
+            progress=progress, seed=seed,
         )
     placed = {scan: None if T is None else T.tolist() for scan, T in zip(scans, found.poses, strict=True)}
     write_text(poses_to, json.dumps(placed, indent=1))
