@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..clock import Clock
 from ..dof import Dof
 from ..fields.protocol import Floats
-from ..motions import inverse
+from ..motions import inverse, reach_of
 from .assembly import Assembly
 from .choice import Choice, Pairs
 from .fused import fused
@@ -31,7 +31,8 @@ _TILE = 16          # scans on a side of a tile of glances
 _OVERLAP = 0.3      # of either scan: pairs that overlap so much, by their poses, are registered, too
 _NEAR = 20          # scans around each one, of which that is asked
 _NEIGHBOURS = 3     # of these, for each scan
-_ROUNDS = 3         # of the joint refinement
+_ROUNDS = 3         # of the joint refinement, at most
+_STILL = 2e-3       # voxels: a step that moves no place further is its last
 _MODEL = 0.25       # of a component's median voxel: the thinning of its model
 
 
@@ -154,25 +155,27 @@ def _refined(
     edges = [replace(e, i=row[e.i], j=row[e.j]) for e in graph.believed(members)]
     world, poses, anchors = anchored(graph.poses[members], members, given, dof)
     poses = optimise(poses, edges, anchors)
+    reach = 2 * max(float(np.linalg.norm(edge.reference)) for edge in edges)
     for _ in range(_ROUNDS):
-        system = anchors.system(poses)
-        for edge, pull in _pulled(shop, members, poses, edges, both_ways=True):
+        system, known = anchors.system(poses), []
+        for edge, pull in _pulled(shop, members, poses, edges):
             A_i, A_j = edge.jacobians(poses)
             system.add({edge.i: A_i, edge.j: A_j}, pull.H, pull.g)
-        poses = anchors.moved(poses, system.step())
-    final = [edge for edge, _ in _pulled(shop, members, poses, edges, both_ways=False)]
-    covariances = linearised(poses, final, anchors).covariances()
+            known += [edge] * (edge.i < edge.j)  # the reverse knows the same
+        step = system.step()
+        poses = anchors.moved(poses, step)
+        if max(reach_of(x, reach) for x in step) < _STILL * graph.unit:
+            break
+    covariances = linearised(poses, known, anchors).covariances()
     poses = world @ poses
     for scan in set(given.fixed) & set(members):
         poses[row[scan]] = given.poses[scan]  # to the last bit
     return poses, covariances
 
 
-def _pulled(
-    shop: Workshop, members: list[int], poses: Floats, edges: list[Edge], both_ways: bool
-) -> list[tuple[Edge, Pull]]:
+def _pulled(shop: Workshop, members: list[int], poses: Floats, edges: list[Edge]) -> list[tuple[Edge, Pull]]:
     """What the fields say at the present poses: of each edge, and of its reverse."""
-    ends = [(e.i, e.j) for e in edges] + [(e.j, e.i) for e in edges if both_ways]
+    ends = [(e.i, e.j) for e in edges] + [(e.j, e.i) for e in edges]
     tasks = []
     for i, j in ends:
         a, b = name_of(members[i]), name_of(members[j])
