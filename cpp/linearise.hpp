@@ -18,6 +18,7 @@ struct RobustLoss {
   double scale;       // of residuals over their spread: one as large has a quarter of the weight
   double min_cosine;  // between normals that agree: below, a pseudo point is truncated
   double reach;       // from x to m, a length: beyond, a pseudo point has no partner
+  bool facing = false;  // whether normals point towards the sensors: then those that oppose do not agree
 };
 
 struct Residual {
@@ -31,7 +32,7 @@ inline std::optional<Residual> residual(Vec3 x, Vec3 own_normal, double offset, 
   const Vec3 away = x - mean;
   if (!(dot(away, away) <= loss.reach * loss.reach)) return {};
   double cosine = dot(normal, own_normal);
-  if (cosine < 0) normal = -1.0 * normal, cosine = -cosine;
+  if (cosine < 0 && !loss.facing) normal = -1.0 * normal, cosine = -cosine;
   if (!(cosine >= loss.min_cosine)) return {};
   Vec3 between = normal + own_normal;
   between = (1 / std::sqrt(dot(between, between))) * between;

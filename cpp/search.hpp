@@ -47,6 +47,7 @@ struct SearchSettings {
   int enough_hits;      // to settle on the best, where
   float distinct;       // the next has less than this share of its score
   float alike;          // all have more than this share of it: to search on would find no better one
+  bool facing;          // normals point towards the sensors: those that oppose do not agree
 };
 
 // Poses near a guess: the pivot may move by `radius` from where the guess puts it, and the cloud turn by an angle.
@@ -131,6 +132,7 @@ class Shortlist {
 inline float sum_of_scores(const ClosestGrid& grid, std::span<const Plane> probes, const Pose& pose, std::size_t begin,
                            std::size_t end, const SearchSettings& s) {
   constexpr std::size_t kAtOnce = 16;
+  const float opposed = s.facing ? 1.0f : -1.0f;  // what a cosine is multiplied by for the other sign of a normal
   int on = 0;
   float met = 0;
   for (std::size_t i = begin; i < end; i += kAtOnce) {
@@ -142,7 +144,8 @@ inline float sum_of_scores(const ClosestGrid& grid, std::span<const Plane> probe
     for (std::size_t k = 0; k < n; ++k) {
       const Plane& plane = grid.plane_in(cell[k]);
       const float distance = std::abs(dot(plane.normal, x[k] - plane.mean));
-      const float cosine = std::abs(dot(plane.normal, pose.turned(probes[i + k].normal)));
+      const float between = dot(plane.normal, pose.turned(probes[i + k].normal));
+      const float cosine = std::max(between, opposed * between);
       on += static_cast<int>(distance < s.tolerance) & static_cast<int>(cosine > s.min_cosine);
       met += plane.weight;
     }

@@ -79,12 +79,12 @@ void meet(const ClosestGrid& grid, PointsView<double> places, PointsView<double>
 
 // Many poses against the grid.
 nb::tuple grid_sums(const ClosestGrid& grid, Points<double> places, Points<double> normals, Values offsets,
-                    Matrices4 poses, double scale, double min_cosine, double reach, int threads) {
+                    Matrices4 poses, double scale, double min_cosine, double reach, bool facing, int threads) {
   check_lengths(places.shape(0), {normals.shape(0), offsets.shape(0)});
   std::vector<StepSums<6>> sums(poses.shape(0));
   {
     nb::gil_scoped_release free;
-    const RobustLoss loss{scale, min_cosine, reach};
+    const RobustLoss loss{scale, min_cosine, reach, facing};
     meet(grid, view(places), view(normals), poses, threads,
          [&](std::size_t k, std::size_t i, Vec3 x, Vec3 normal, const Plane& plane) {
            const auto found = residual(x, normal, offsets.data()[i], widen(plane.mean), widen(plane.normal), loss);
@@ -96,13 +96,13 @@ nb::tuple grid_sums(const ClosestGrid& grid, Points<double> places, Points<doubl
 
 // For each pose the weights of the surfels that agree with and that meet the surface, and the share of those on it (b, 3).
 Array<double> grid_agreement(const ClosestGrid& grid, Points<double> places, Points<double> normals, Values weights,
-                             Matrices4 poses, double scale, double min_cosine, double reach, int threads) {
+                             Matrices4 poses, double scale, double min_cosine, double reach, bool facing, int threads) {
   const std::size_t n = places.shape(0), b = poses.shape(0);
   check_lengths(n, {normals.shape(0), weights.shape(0)});
   std::vector<AgreementSums> sums(b);
   {
     nb::gil_scoped_release free;
-    const RobustLoss loss{scale, min_cosine, reach};
+    const RobustLoss loss{scale, min_cosine, reach, facing};
     meet(grid, view(places), view(normals), poses, threads,
          [&](std::size_t k, std::size_t i, Vec3 x, Vec3 normal, const Plane& plane) {
            sums[k].add(x, normal, weights.data()[i], widen(plane.mean), widen(plane.normal), loss);
@@ -227,7 +227,7 @@ nb::tuple search_poses(const ClosestGrid& grid, const PairTable& table, Points<d
   const SearchSettings s{nb::cast<std::uint64_t>(settings["seed"]), whole("rounds"), whole("draws"), whole("matches"),
                          real("tolerance"), real("min_cosine"), real("penalty"), real("doubt"), whole("keep"),
                          real("apart_cosine"), real("apart_distance"), real("drift_cosine"), real("drift_distance"),
-                         whole("enough_hits"), real("distinct"), real("alike")};
+                         whole("enough_hits"), real("distinct"), real("alike"), nb::cast<bool>(settings["facing"])};
   std::optional<Confinement> near;
   if (confinement) {
     const auto guess = nb::cast<Matrices4>((*confinement)[0]);
@@ -267,9 +267,9 @@ void bind_search(nb::module_& m) {
   nb::class_<ClosestGrid>(m, "ClosestGrid", "The surfel closest to any place near a surface, looked up in a grid.")
       .def("__init__", &construct_grid, "means"_a, "normals"_a, "cell"_a, "margin"_a)
       .def("robust_sums", &grid_sums, "places"_a, "normals"_a, "offsets"_a, "poses"_a, "scale"_a,
-           "min_cosine"_a, "reach"_a, "threads"_a)
+           "min_cosine"_a, "reach"_a, "facing"_a, "threads"_a)
       .def("agreement", &grid_agreement, "places"_a, "normals"_a, "weights"_a, "poses"_a, "scale"_a, "min_cosine"_a, "reach"_a,
-           "threads"_a);
+           "facing"_a, "threads"_a);
   nb::class_<PairTable>(m, "PairTable", "Pairs of surfels, found again by what no rigid motion changes.")
       .def("__init__", &construct_table, "means"_a, "normals"_a, "shortest"_a, "longest"_a, "threads"_a)
       .def("__len__", &PairTable::size)

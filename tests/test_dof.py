@@ -256,7 +256,7 @@ def test_the_search_finds_the_allowed_pose_next_to_the_true_one(names, inverted,
     grid, table = _core.ClosestGrid(means, normals, 0.2, 0.6), _core.PairTable(means, normals, 1, 4, 1)
     settings = {"seed": 1, "drift_cosine": 0.99, "drift_distance": 0.3, "rounds": 2, "draws": 64, "matches": 60,
                 "tolerance": 0.1, "min_cosine": 0.9, "penalty": 0.2, "doubt": 1.0, "keep": 10, "apart_cosine": 0.99,
-                "apart_distance": 0.1, "enough_hits": 8, "distinct": 0.6, "alike": 0.85}
+                "apart_distance": 0.1, "enough_hits": 8, "distinct": 0.6, "alike": 0.85, "facing": False}
     for _ in range(5):
         allowed = allowed_of(names, inverted, any_motion, rng)
         T = any_allowed(allowed, rng, 1)[0] @ motion(rng, 0.5, 0.01)

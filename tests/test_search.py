@@ -155,7 +155,7 @@ def test_few_points_have_none_and_do_not_fail(rng, n):
 SETTINGS = {"seed": 1, "drift_cosine": 0.97, "drift_distance": 0.5,
             "rounds": 2, "draws": 64, "matches": 60, "tolerance": 0.05, "min_cosine": 0.95, "penalty": 0.2,
             "doubt": 1.0, "keep": 10, "apart_cosine": 0.99, "apart_distance": 0.1, "enough_hits": 8, "distinct": 0.6,
-            "alike": 0.85}
+            "alike": 0.85, "facing": False}
 
 
 def good(a, n, b, m):

@@ -47,6 +47,14 @@ def test_surfels_lie_on_a_sphere_and_face_outward_or_inward(rng):
     assert np.allclose(np.linalg.norm(surface.normals, axis=1), 1)
 
 
+def test_surfels_face_the_eye_where_it_is_known(rng):
+    for eye in (np.array([3.0, 4, 5]), np.array([1.0, 1, -2])):
+        surface = Surface(floor_and_wall(20_000, rng), VOXEL, 1, eye)
+        assert ((eye - surface.origin - surface.places) * surface.normals).sum(axis=1).min() > 0
+        assert surface.faces(surface)
+        assert not surface.faces(Surface(floor_and_wall(20_000, rng), VOXEL, 1))
+
+
 def test_surfels_of_noisy_planes_lie_in_them(rng):
     points = floor_and_wall(60_000, rng) + 0.005 * rng.normal(size=(60_000, 3))
     surface = Surface(points, VOXEL, 1)

@@ -87,6 +87,7 @@ class ClosestGrid:
         scale: float,
         min_cosine: float,
         reach: float,
+        facing: bool,
         threads: int,
     ) -> tuple[Floats, Floats, Floats]:
         """H (b, 6, 6) and g (b, 6) of pseudo points (n, 3) under poses (b, 4, 4), and (b, 4): sums of weights, of
@@ -100,6 +101,7 @@ class ClosestGrid:
         scale: float,
         min_cosine: float,
         reach: float,
+        facing: bool,
         threads: int,
     ) -> Floats:
         """For each pose (b, 3): the weights (n,) of the surfels that agree with the surface, and of those near it,

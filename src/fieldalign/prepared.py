@@ -109,7 +109,9 @@ class PreparedCloud:
         from the cloud's own voxel."""
         rung = round(4 * float(np.log2(voxel / self.scale.voxel)))
         if rung not in self._surfaces:
-            self._surfaces[rung] = Surface(self.fine.points, self.scale.voxel * 2.0 ** (rung / 4), self.threads)
+            self._surfaces[rung] = Surface(
+                self.fine.points, self.scale.voxel * 2.0 ** (rung / 4), self.threads, self.eye
+            )
         return self._surfaces[rung]
 
     @property

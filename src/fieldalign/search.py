@@ -56,7 +56,7 @@ def search(
     voxel = max(held.voxel, moving.voxel)
     settings = _SETTINGS | {
         "seed": int(rng.integers(2**63)), "rounds": rounds, "tolerance": voxel, "apart_distance": _APART * voxel,
-        "drift_distance": _DRIFT * voxel,
+        "drift_distance": _DRIFT * voxel, "facing": held.faces(moving),
     }
     near = None
     if within is not None:

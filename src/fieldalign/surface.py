@@ -29,12 +29,13 @@ _PAIR_BAND = 6.0, 45.0  # voxels between the two surfels of a pair
 class Surface:
     """Surfels, about one for each occupied voxel.
 
-    places, normals: (n, 3), about `origin`; a normal's sign means nothing. flatness: (n,), 0 to 1.
+    places, normals: (n, 3), about `origin`; a normal's sign means nothing, unless the eye (3,), where the sensor stood,
+    is known: then normals point towards it. flatness: (n,), 0 to 1.
     voxel: the edge, in the cloud's unit. origin: (3,), a place in the cloud's frame.
     """
 
-    def __init__(self, points: NDArray[Any], voxel: float, threads: int) -> None:
-        self.voxel = voxel
+    def __init__(self, points: NDArray[Any], voxel: float, threads: int, eye: Floats | None = None) -> None:
+        self.voxel, self.faces_sensor = voxel, eye is not None
         self._threads = threads
         bounds, _ = _core.survey(points, threads)
         self.origin = bounds.mean(axis=0)
@@ -52,6 +53,9 @@ class Surface:
         thinnest, widest = _PLANAR
         planar = (width > thinnest * voxel) & (width < widest * voxel)
         self.places, self.normals = _where(planar, places), _where(planar, normals)
+        if eye is not None:
+            away = np.einsum("ni,ni->n", self.normals, self.places + self.origin - eye) > 0
+            self.normals = np.where(away[:, None], -self.normals, self.normals)
         self.flatness = np.clip(1 - _where(planar, thickness / np.maximum(width, 1e-300)) ** 2, _LEAST_FLAT, 1)
 
     def scaled(self, factor: float) -> Surface:
@@ -64,6 +68,10 @@ class Surface:
 
     def __len__(self) -> int:
         return len(self.places)
+
+    def faces(self, other: Surface) -> bool:
+        """Whether normals of both point towards their sensors, so that the two sides of a wall are told apart."""
+        return self.faces_sensor and other.faces_sensor
 
     @lazy
     def extent(self) -> float:

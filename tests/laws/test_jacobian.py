@@ -52,7 +52,7 @@ class Meeting:
     def sums(self, pose):
         grid = _core.ClosestGrid(self.means, self.normals, 0.5, 3.0)
         H, g, totals = grid.robust_sums(
-            self.places, self.own_normals, self.offsets, pose[None], SCALE, MIN_COSINE, REACH, 1
+            self.places, self.own_normals, self.offsets, pose[None], SCALE, MIN_COSINE, REACH, False, 1
         )
         return H[0], g[0], totals[0]
 

@@ -52,7 +52,8 @@ def agreement(
     voxel = max(held.voxel, moving.voxel)
     places, normals, weights = moving.places[rows], moving.normals[rows], moving.weights[rows]
     shares = held.coarse_grid.agreement(
-        places, normals, weights / weights.sum(), np.ascontiguousarray(poses), voxel, MIN_COSINE, 3 * voxel, threads
+        places, normals, weights / weights.sum(), np.ascontiguousarray(poses), voxel, MIN_COSINE, 3 * voxel,
+        held.faces(moving), threads,
     )
     return Agreement(*shares.T)
 

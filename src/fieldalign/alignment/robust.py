@@ -57,7 +57,9 @@ class GridStage:
         self.normals = moving.normals[rows]
         self.places = moving.places[rows] + self.offsets[:, None] * self.normals
         self.grid = held.coarse_grid if level.spread > 1 else held.fine_grid
-        self.loss = (max(level.spread, _SHARPEST) * voxel, MIN_COSINE, 3 * (level.spread + 1) * voxel)
+        self.loss = (
+            max(level.spread, _SHARPEST) * voxel, MIN_COSINE, 3 * (level.spread + 1) * voxel, held.faces(moving),
+        )
         self.iterations, self.threads = level.iterations, threads
 
     def step(self, poses: Floats) -> tuple[Floats, Step]:
