@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..clock import Clock
 from ..dof import Dof
 from ..fields.protocol import Floats
-from ..motions import inverse, reach_of
+from ..motions import inverse, log_motion, reach_of
 from .assembly import Assembly
 from .choice import Choice, Pairs
 from .fused import fused
@@ -31,9 +31,12 @@ _TILE = 16          # scans on a side of a tile of glances
 _OVERLAP = 0.3      # of either scan: pairs that overlap so much, by their poses, are registered, too
 _NEAR = 20          # scans around each one, of which that is asked
 _NEIGHBOURS = 3     # of these, for each scan
+_AS_BEFORE = 0.1    # voxels: a scan that moves no further is not looked at again
 _ROUNDS = 3         # of the joint refinement, at most
 _STILL = 2e-3       # voxels: a step that moves no place further is its last
 _MODEL = 0.25       # of a component's median voxel: the thinning of its model
+
+Sightings: TypeAlias = dict[tuple[int, int], tuple[Floats, tuple[float, float]]]
 
 
 def build(shop: Workshop, given: Given, ordered: bool, dof: Dof | None, seed: int) -> Assembly:
@@ -51,7 +54,8 @@ def build(shop: Workshop, given: Given, ordered: bool, dof: Dof | None, seed: in
         graph.add(_related(shop, pairs, given, dof, seed))
         pairs = choice.more(graph.component)
     clock.lap("pairs")
-    while graph.check(seen := _seen(shop, graph)):
+    sightings: Sightings = {}
+    while graph.check(seen := _seen(shop, graph, sightings)):
         graph.add(_related(shop, choice.more(graph.component), given, dof, seed))
     clock.lap("check")
     near = choice.add(_overlapping(seen))
@@ -122,18 +126,29 @@ def _related(
     return results
 
 
-def _seen(shop: Workshop, graph: Graph) -> dict[tuple[int, int], tuple[float, float]]:
-    """Of pairs that were not tried but lie near by their poses: how much overlaps, and how much was looked through."""
-    tasks, partners = [], graph.nearby(_NEAR)
-    for i, near in partners.items():
-        names = [name_of(j) for j in near]
-        poses = inverse(graph.poses[i]) @ graph.poses[near]
-        tasks.append(Task(f"overlaps {i}", (name_of(i), *names), (name_of(i), names, poses)))
-    found = shop.do("comparing", Overlaps(graph.unit), tasks)
-    return {
-        (i, j): shares for i, task in zip(partners, tasks, strict=True)
-        for j, shares in zip(partners[i], found[task.key].value or [], strict=False)
+def _seen(shop: Workshop, graph: Graph, before: Sightings) -> dict[tuple[int, int], tuple[float, float]]:
+    """Of pairs that were not tried but lie near by their poses: how much overlaps, and how much was looked through.
+
+    before: what was found of pairs, at which poses. Who lies as before is not looked at again; the others are added.
+    """
+    poses = {
+        (i, j): inverse(graph.poses[i]) @ graph.poses[j] for i, near in graph.nearby(_NEAR).items() for j in near
     }
+    moved: dict[int, list[int]] = {}
+    for (i, j), T_ij in poses.items():
+        off = np.inf if (i, j) not in before else reach_of(log_motion(inverse(before[i, j][0]) @ T_ij), graph.reach(j))
+        if off > _AS_BEFORE * graph.unit:
+            moved.setdefault(i, []).append(j)
+    tasks = []
+    for i, near in moved.items():
+        names = [name_of(j) for j in near]
+        data = name_of(i), names, np.stack([poses[i, j] for j in near])
+        tasks.append(Task(f"overlaps {i}", (name_of(i), *names), data))
+    found = shop.do("comparing", Overlaps(graph.unit), tasks)
+    for (i, near), task in zip(moved.items(), tasks, strict=True):
+        for j, shares in zip(near, found[task.key].value or [(0.0, 0.0)] * len(near), strict=True):
+            before[i, j] = poses[i, j], shares
+    return {pair: before[pair][1] for pair in poses}
 
 
 def _overlapping(seen: Mapping[tuple[int, int], tuple[float, float]]) -> Pairs:

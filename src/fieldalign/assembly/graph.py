@@ -17,7 +17,7 @@ from .world import Given
 
 _CLEAR = 0.003  # share of a surface that a sensor looked through: less in a static scene, more where places look alike
 _AGREE = 1.5    # more than so many uncertain pairs that agree join what they lie between, unclear ones count less
-_CHANCE = 0.1   # what it says for a pose that nothing was looked through, to what it says against if something was
+_OBJECTION, _CHANCE = 20.0, 0.5  # to a pair that was accepted: one that was looked through, and one that was not
 _CLOSER = 2.0   # by so much the margin may fall short there
 
 
@@ -51,6 +51,10 @@ class Graph:
             key=lambda members: (-len(members), members),
         )
 
+    def reach(self, scan: int) -> float:
+        """The extent of a scan."""
+        return self._lengths[scan][1]
+
     def nearby(self, count: int) -> dict[int, list[int]]:
         """For each placed scan those later ones of its component that no pair was tried with, but that lie near enough
         to overlap, of either's nearest few."""
@@ -78,8 +82,8 @@ class Graph:
         votes = [(e.i, e.j, -clarity(self.results[e.i, e.j])) for e, ok in self._judged() if ok]
         for (i, j), (on, through) in seen.items():
             clear = clarity_of(through)
-            votes.append((i, j, on * (1 - clear - _CHANCE * clear)))
-        guilty = blamed(self._consensus, votes, self._consensus.strength)
+            votes.append((i, j, on * (_OBJECTION * (1 - clear) - _CHANCE * clear)))
+        guilty = blamed(self._consensus, votes, np.sqrt([edge.strength for edge in self.edges]))
         self._given_up |= {self.pairs[k] for k in guilty}
         if guilty:
             self.add({})
