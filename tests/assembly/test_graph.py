@@ -87,9 +87,9 @@ def test_two_weak_pairs_that_do_not_agree_join_nothing(truth):
 
 
 def test_near_ones_that_were_not_tried_are_named_once(truth):
-    near = graph_of(truth, SURE | {(1, 2): GOOD}).nearby(5)
-    assert near == {0: [2, 3], 1: [3]}
-    assert graph_of(truth, SURE | {(1, 2): GOOD}).nearby(0) == {}
+    near = graph_of(truth, SURE | {(1, 2): GOOD}).unseen(5)
+    assert near == [(0, 2), (0, 3), (1, 3)]
+    assert graph_of(truth, SURE | {(1, 2): GOOD}).unseen(0) == []
 
 
 def test_why_a_scan_is_left_out(truth):
@@ -97,3 +97,43 @@ def test_why_a_scan_is_left_out(truth):
     reasons = graph.reasons_of([2, 3])
     assert "none of 1 registrations was accepted" in reasons[2]
     assert "no other scan looks like it" in reasons[3]
+
+
+def seen_in(graph, truth, pairs):
+    for (i, j), (on, through) in pairs.items():
+        graph.saw((i, j), inverse(truth[i]) @ truth[j], on, through)
+
+
+def test_what_was_seen_holds_where_it_was_seen(truth):
+    graph = graph_of(truth, SURE | {(1, 2): GOOD})
+    seen_in(graph, truth, {(0, 2): (0.5, 0.0)})
+    assert graph.unseen(5) == [(0, 3), (1, 3)]
+    assert list(graph.seen()) == [(0, 2, 0.5, 0.0)]
+    graph.saw((0, 2), exp_twist(np.array([0, 0, 0.1, 0, 0, 0])) @ inverse(truth[0]) @ truth[2], 0.5, 0.0)
+    assert list(graph.seen()) == []
+    assert (0, 2) in graph.unseen(5)
+
+
+def test_one_weak_pair_joins_where_all_that_it_lays_together_agrees(truth):
+    graph = graph_of(truth, SURE | {(1, 2): WEAK})
+    seen_in(graph, truth, {(0, 2): (0.6, 0.0), (1, 3): (0.6, 0.0)})
+    assert graph.check()
+    assert graph.components == [[0, 1, 2, 3]]
+    assert not graph.check()  # nothing has changed since
+
+
+@pytest.mark.parametrize("through", [None, 0.01])
+def test_what_is_unknown_or_looked_through_joins_nothing(truth, through):
+    graph = graph_of(truth, SURE | {(1, 2): WEAK})
+    seen_in(graph, truth, {(0, 2): (0.6, through), (1, 3): (0.6, through)})
+    graph.check()
+    assert graph.components == [[0, 1], [2, 3]]
+
+
+def test_a_pair_across_which_sensors_looked_through_is_given_up(truth):
+    graph = graph_of(truth, SURE | {(1, 2): GOOD})
+    assert graph.components == [[0, 1, 2, 3]]
+    seen_in(graph, truth, {(0, 2): (0.6, 0.02), (1, 3): (0.6, 0.02), (0, 3): (0.4, 0.0)})
+    assert graph.check()
+    assert graph.components == [[0, 1], [2, 3]]
+    assert [pair[:2] for pair in graph.told(believed=True)] == [(0, 1), (2, 3)]

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, TypeAlias
+from itertools import groupby
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..clock import Clock
 from ..dof import Dof
 from ..fields.protocol import Floats
-from ..motions import inverse, log_motion, reach_of
+from ..motions import inverse, reach_of
 from .assembly import Assembly
 from .choice import Choice, Pairs
 from .fused import fused
@@ -31,12 +31,9 @@ _TILE = 16          # scans on a side of a tile of glances
 _OVERLAP = 0.3      # of either scan: pairs that overlap so much, by their poses, are registered, too
 _NEAR = 20          # scans around each one, of which that is asked
 _NEIGHBOURS = 3     # of these, for each scan
-_AS_BEFORE = 0.1    # voxels: a scan that moves no further is not looked at again
 _ROUNDS = 3         # of the joint refinement, at most
 _STILL = 2e-3       # voxels: a step that moves no place further is its last
 _MODEL = 0.25       # of a component's median voxel: the thinning of its model
-
-Sightings: TypeAlias = dict[tuple[int, int], tuple[Floats, tuple[float, float]]]
 
 
 def build(shop: Workshop, given: Given, ordered: bool, dof: Dof | None, seed: int) -> Assembly:
@@ -54,11 +51,12 @@ def build(shop: Workshop, given: Given, ordered: bool, dof: Dof | None, seed: in
         graph.add(_related(shop, pairs, given, dof, seed))
         pairs = choice.more(graph.component)
     clock.lap("pairs")
-    sightings: Sightings = {}
-    while graph.check(seen := _seen(shop, graph, sightings)):
+    _look(shop, graph)
+    while graph.check():
         graph.add(_related(shop, choice.more(graph.component), given, dof, seed))
+        _look(shop, graph)
     clock.lap("check")
-    near = choice.add(_overlapping(seen))
+    near = choice.add(_overlapping(graph))
     graph.add(_related(shop, near, graph.guesses(), dof, seed))
     clock.lap("overlaps")
     poses: list[Any] = [None] * len(known)
@@ -126,37 +124,27 @@ def _related(
     return results
 
 
-def _seen(shop: Workshop, graph: Graph, before: Sightings) -> dict[tuple[int, int], tuple[float, float]]:
-    """Of pairs that were not tried but lie near by their poses: how much overlaps, and how much was looked through.
-
-    before: what was found of pairs, at which poses. Who lies as before is not looked at again; the others are added.
-    """
-    poses = {
-        (i, j): inverse(graph.poses[i]) @ graph.poses[j] for i, near in graph.nearby(_NEAR).items() for j in near
-    }
-    moved: dict[int, list[int]] = {}
-    for (i, j), T_ij in poses.items():
-        off = np.inf if (i, j) not in before else reach_of(log_motion(inverse(before[i, j][0]) @ T_ij), graph.reach(j))
-        if off > _AS_BEFORE * graph.unit:
-            moved.setdefault(i, []).append(j)
+def _look(shop: Workshop, graph: Graph) -> None:
+    """Looks at pairs that were not tried but lie near by their poses: how much overlaps, and was looked through."""
     tasks = []
-    for i, near in moved.items():
-        names = [name_of(j) for j in near]
-        data = name_of(i), names, np.stack([poses[i, j] for j in near])
-        tasks.append(Task(f"overlaps {i}", (name_of(i), *names), data))
-    found = shop.do("comparing", Overlaps(graph.unit), tasks)
-    for (i, near), task in zip(moved.items(), tasks, strict=True):
-        for j, shares in zip(near, found[task.key].value or [(0.0, 0.0)] * len(near), strict=True):
-            before[i, j] = poses[i, j], shares
-    return {pair: before[pair][1] for pair in poses}
+    for i, near in groupby(graph.unseen(_NEAR), key=lambda pair: pair[0]):
+        others = [j for _, j in near]
+        names = [name_of(j) for j in others]
+        poses = inverse(graph.poses[i]) @ graph.poses[others]
+        tasks.append((i, others, Task(f"overlaps {i}", (name_of(i), *names), (name_of(i), names, poses))))
+    found = shop.do("comparing", Overlaps(graph.unit), [task for _, _, task in tasks])
+    for i, others, task in tasks:
+        for j, T_ij, shares in zip(others, task.data[2], found[task.key].value or [], strict=False):
+            graph.saw((i, j), T_ij, *shares)
 
 
-def _overlapping(seen: Mapping[tuple[int, int], tuple[float, float]]) -> Pairs:
-    """Those that overlap well: each scan's best few."""
+def _overlapping(graph: Graph) -> Pairs:
+    """Pairs that were not tried, but overlap well by their poses: each scan's best few."""
+    share = {(i, j): on for i, j, on, _ in graph.seen() if graph.component[i] == graph.component[j]}
     chosen: Pairs = []
     asked: Counter[int] = Counter()
-    for i, j in sorted(seen, key=lambda pair: -seen[pair][0]):
-        if seen[i, j][0] >= _OVERLAP and min(asked[i], asked[j]) < _NEIGHBOURS:
+    for i, j in sorted(share, key=lambda pair: -share[pair]):
+        if share[i, j] >= _OVERLAP and min(asked[i], asked[j]) < _NEIGHBOURS:
             asked.update((i, j))
             chosen.append((i, j))
     return chosen

@@ -30,23 +30,25 @@ class Consensus:
 
     def path(self, i: int, j: int) -> list[int]:
         """The edges of the tree between two scans; none where it does not join them."""
-        up_from_i, up_from_j = self._up(i), self._up(j)
-        while up_from_i and up_from_j and up_from_i[-1] == up_from_j[-1]:
-            up_from_i.pop(), up_from_j.pop()
-        return [edge for _, edge in up_from_i + up_from_j] if self._root(i) == self._root(j) else []
+        (one, way), (other, back) = self._up(i), self._up(j)
+        while way and back and way[-1] == back[-1]:
+            way.pop(), back.pop()
+        return way + back if one == other else []
 
-    def _up(self, scan: int) -> list[tuple[int, int]]:
-        """The scans from this one up to below its root, and their edges."""
+    def _up(self, scan: int) -> tuple[int, list[int]]:
+        """The root that a scan hangs on, and the edges up to there."""
         way = []
         while self.before[scan] >= 0:
-            way.append((scan, int(self.by[scan])))
+            way.append(int(self.by[scan]))
             scan = int(self.before[scan])
-        return way
+        return scan, way
 
-    def _root(self, scan: int) -> int:
-        while self.before[scan] >= 0:
-            scan = int(self.before[scan])
-        return scan
+    def roots(self) -> NDArray[np.int64]:
+        """The root (n,) that each scan hangs on."""
+        at = np.arange(len(self.before))
+        while (self.before[at] >= 0).any():
+            at = np.where(self.before[at] >= 0, self.before[at], at)
+        return at
 
 
 def consensus(count: int, edges: Sequence[Edge], voxels: Floats, extents: Floats, seed: int) -> Consensus:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..fields.protocol import Floats
+from ..motions import inverse, log_motion, reach_of
 from .blame import blamed
 from .consensus import Consensus, consensus
 from .pair_result import PairResult
@@ -17,6 +18,7 @@ from .world import Given
 
 _CLEAR = 0.003  # share of a surface that a sensor looked through: less in a static scene, more where places look alike
 _AGREE = 1.5    # more than so many uncertain pairs that agree join what they lie between, unclear ones count less
+_AS_BEFORE = 0.1  # voxels: a scan that moves no further lies where it was seen
 _OBJECTION, _CHANCE = 20.0, 0.5  # to a pair that was accepted: one that was looked through, and one that was not
 _CLOSER = 2.0   # by so much the margin may fall short there
 
@@ -29,6 +31,7 @@ class Graph:
         self.unit = float(np.median([voxel for voxel, _ in lengths.values()])) if lengths else 1.0
         self.results: dict[tuple[int, int], PairResult] = {}
         self._given_up: set[tuple[int, int]] = set()
+        self._seen: dict[tuple[int, int], tuple[Floats, float, float | None]] = {}
         self._consensus: Consensus | None = None
         self.component: NDArray[np.int64] = np.arange(count)
         self.components: list[list[int]] = []
@@ -51,43 +54,52 @@ class Graph:
             key=lambda members: (-len(members), members),
         )
 
-    def reach(self, scan: int) -> float:
-        """The extent of a scan."""
-        return self._lengths[scan][1]
-
-    def nearby(self, count: int) -> dict[int, list[int]]:
-        """For each placed scan those later ones of its component that no pair was tried with, but that lie near enough
-        to overlap, of either's nearest few."""
-        near: dict[int, list[int]] = {}
-        for members in self.components:
+    def unseen(self, count: int) -> list[tuple[int, int]]:
+        """Pairs (i, j) that the tree lays near enough to overlap, of either's nearest few, but of which nobody knows
+        yet what they show of each other where they lie."""
+        roots = np.zeros(0, int) if self._consensus is None else self._consensus.roots()
+        near: list[tuple[int, int]] = []
+        for root in np.flatnonzero(np.bincount(roots, minlength=1) > 1):
+            members = np.flatnonzero(roots == root)
             places = self.poses[members, :3, 3]
-            reach = np.array([self._lengths[k][1] / 2 for k in members])
+            reach = np.array([self._lengths[int(k)][1] / 2 for k in members])
             away = np.linalg.norm(places[:, None] - places, axis=2)
             rank = np.argsort(np.argsort(away, axis=1, kind="stable"), axis=1)  # 0: the scan itself
             may = (np.minimum(rank, rank.T) <= count) & (away < np.minimum(reach, reach[:, None]))
-            for row, i in enumerate(members):
-                chosen = [members[k] for k in np.flatnonzero(may[row]) if members[k] > i]
-                if chosen := [j for j in chosen if (i, j) not in self.results]:
-                    near[i] = chosen
-        return near
+            near += [(int(members[a]), int(members[b])) for a, b in np.argwhere(np.triu(may, 1))]
+        return [pair for pair in near if pair not in self.results and not self._is_as_seen(pair)]
 
-    def check(self, seen: Mapping[tuple[int, int], tuple[float, float]]) -> bool:
-        """Gives up the edges that lay scans where sensors looked through them; whether there were any.
+    def saw(self, pair: tuple[int, int], T_ij: Floats, on: float, through: float | None) -> None:
+        """Takes what a pair shows of each other at T_ij (4, 4): the share of surface that lies on the other's, and the
+        share that was looked through, None where no sensor is known."""
+        self._seen[pair] = T_ij, on, through
 
-        seen: of pairs (i, j) that were not tried, at the poses: the share of surface that lies on the other's, and the
-        share that was looked through.
-        """
+    def seen(self) -> Iterator[tuple[int, int, float, float | None]]:
+        """Pairs i, j that lie where they were seen, and these shares."""
+        for pair, (_, on, through) in self._seen.items():
+            if self._is_as_seen(pair):
+                yield *pair, on, through
+
+    def _is_as_seen(self, pair: tuple[int, int]) -> bool:
+        if pair not in self._seen or self._consensus is None:
+            return False
+        i, j = pair
+        off = log_motion(inverse(self._seen[pair][0]) @ inverse(self.poses[i]) @ self.poses[j])
+        return reach_of(off, self._lengths[j][1]) <= _AS_BEFORE * self.unit
+
+    def check(self) -> bool:
+        """Gives up edges that lay scans where sensors looked through them, and joins what lies well; whether anything
+        has changed."""
         if self._consensus is None:
             return False
-        votes = [(e.i, e.j, -clarity(self.results[e.i, e.j])) for e, ok in self._judged() if ok]
-        for (i, j), (on, through) in seen.items():
-            clear = clarity_of(through)
-            votes.append((i, j, on * (_OBJECTION * (1 - clear) - _CHANCE * clear)))
+        before = self.component
+        believed = zip(self.edges, self._consensus.believed, strict=True)
+        votes = [(e.i, e.j, -clarity(self.results[e.i, e.j])) for e, ok in believed if ok]
+        votes += [(i, j, -_says(on, through)) for i, j, on, through in self.seen()]
         guilty = blamed(self._consensus, votes, np.sqrt([edge.strength for edge in self.edges]))
         self._given_up |= {self.pairs[k] for k in guilty}
-        if guilty:
-            self.add({})
-        return bool(guilty)
+        self.add({})
+        return bool(guilty) or not np.array_equal(before, self.component)
 
     @property
     def poses(self) -> Floats:
@@ -119,25 +131,25 @@ class Graph:
 
     def _joined(self) -> NDArray[np.int64]:
         """The component (n,) of each scan. One edge joins two scans if it is certain; others, as along a street that
-        holds a pose in part only, join where at least two agree."""
+        holds a pose in part only, join where two agree, or where what they lay on each other agrees."""
         assert self._consensus is not None
         label = np.arange(self._count)
-        weak: list[tuple[Edge, float]] = []
+        links = [(i, j, _says(on, through)) for i, j, on, through in self.seen()]
         for edge, ok in zip(self.edges, self._consensus.believed, strict=True):
             result = self.results[edge.i, edge.j]
             if ok and is_certain(result):
                 label[label == label[edge.j]] = label[edge.i]
             elif ok:
-                weak.append((edge, clarity(result)))
+                links.append((edge.i, edge.j, clarity(result)))
         while True:
             between: dict[tuple[int, int], float] = {}
-            for edge, clear in weak:
-                a, b = sorted((int(label[edge.i]), int(label[edge.j])))
-                between[a, b] = between.get((a, b), 0) + clear * (a != b)
-            joined = [pair for pair, number in between.items() if number > _AGREE]
-            if not joined:
+            for i, j, agrees in links:
+                a, b = sorted((int(label[i]), int(label[j])))
+                between[a, b] = between.get((a, b), 0) + agrees * (a != b)
+            best = max(between, key=lambda pair: (between[pair], pair), default=(0, 0))
+            if between.get(best, 0) <= _AGREE:
                 return label
-            label[label == joined[0][1]] = joined[0][0]
+            label[label == best[1]] = best[0]
 
     def _reason_of(self, scan: int) -> str:
         asked = [(r.evidence.strength if r.evidence else 0.0, r) for pair, r in self.results.items() if scan in pair]
@@ -153,6 +165,14 @@ def is_certain(result: PairResult) -> bool:
     """Whether a pair alone joins two scans: it is accepted, and no sensor that is known looked through the other's
     surface, not even through as much as furniture that was moved."""
     return result.accepted and (result.evidence is None or (result.evidence.seen_through or 0.0) <= _CLEAR)
+
+
+def _says(on: float, through: float | None) -> float:
+    """What speaks for the pose of a pair that was not registered, an accepted pair being 1; less than 0: against it."""
+    if through is None:
+        return 0.0
+    clear = clarity_of(through)
+    return on * (_CHANCE * clear - _OBJECTION * (1 - clear))
 
 
 def clarity(result: PairResult) -> float:

@@ -87,16 +87,16 @@ class Overlaps:
 
     unit: float
 
-    def __call__(self, data: tuple[str, list[str], Floats], load: Load) -> list[tuple[float, float]]:
+    def __call__(self, data: tuple[str, list[str], Floats], load: Load) -> list[tuple[float, float | None]]:
         """The larger share of either's surface that lies on the other's, and that which the other's sensor looked
-        through; data: a name i, other names j, and T_ij (m, 4, 4)."""
+        through, None where none is known; data: a name i, other names j, and T_ij (m, 4, 4)."""
         one, others, poses = data
         return [self._of(load(one), load(other), T_ij) for other, T_ij in zip(others, poses, strict=True)]
 
-    def _of(self, scan: ThinScan, other: ThinScan, T_ij: Floats) -> tuple[float, float]:
+    def _of(self, scan: ThinScan, other: ThinScan, T_ij: Floats) -> tuple[float, float | None]:
         pair = comparison(scan, other, self.unit)
         there, back = both_ways(*pair.surfaces(), pair.pose(T_ij)[None], 1)
-        return float(max(there.on[0], back.on[0])), looked_through(pair, T_ij) or 0.0
+        return float(max(there.on[0], back.on[0])), looked_through(pair, T_ij)
 
 
 def pulls(data: tuple[str, str, Floats], load: Load) -> Pull:
