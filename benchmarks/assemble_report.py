@@ -35,8 +35,9 @@ moved at random in SE(3), or turned about the vertical where it says levelled. f
 ABOUT_SETS = """\
 Right: within 2 degrees and 2 % of the scan's extent (at its centroid) of the truth, in the largest component of its
 set, after that is laid on the truth by the mean motion of the scans that agree best. Foreign: scans in a component of
-another set. Whole: the components are the sets, no more and no fewer. Sums over {seeds} seed(s); medians of time. The
-peers try all pairs, told the voxel of each set. On the heap they do not run: no voxel suits objects and streets alike.
+another set. Whole: the components are the sets, no more and no fewer. Sums over {seeds} seed(s), of the peers over the
+first; medians of time. The peers try all pairs, told the voxel of each set. On the heap they do not run: no voxel suits
+objects and streets alike.
 """
 ABOUT_BUILDING = """\
 {scans} scans of a simulated building (benchmarks/building.py) with exact truth, from files, on two processes; told that

@@ -7,7 +7,7 @@ import pytest
 
 import fieldalign as fa
 from fieldalign.assembly import stages
-from fieldalign.assembly.executor import Processes, Serial
+from fieldalign.assembly.executor import Serial
 from fieldalign.clouds.simulated import Box, Cylinder, Scene, Sphere, simulate_room
 from fieldalign.motions import apply, exp_twist, inverse, log_motion, translation
 
@@ -154,9 +154,12 @@ def test_the_rest_of_the_answer(heap, serial):
     assert repr(serial).startswith("Assembly(7 of 9 scans in 2 components")
 
 
-def test_processes_give_the_same_bits(levelled):
+@pytest.mark.parametrize("executor", [2, "local"])
+def test_processes_and_a_dask_cluster_give_the_same_bits(levelled, executor):
+    if executor == "local":
+        pytest.importorskip("distributed")
     clouds = [*levelled[0], np.ones((5, 3))]
-    found = fa.assemble(clouds, executor=Processes(2), threads=1)
+    found = fa.assemble(clouds, executor=executor, threads=1)
     assert found.components == [[0, 1, 2]]
     assert bits(found) == bits(fa.assemble(clouds, executor=Serial(1)))
 

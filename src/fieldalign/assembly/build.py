@@ -29,6 +29,7 @@ from .world import Given, anchored
 
 _TILE = 16          # scans on a side of a tile of glances
 _OVERLAP = 0.3      # of either scan: pairs that overlap so much, by their poses, are registered, too
+_CHECKS = 20        # rounds in which edges are given up, at most
 _NEAR = 20          # scans around each one, of which that is asked
 _NEIGHBOURS = 3     # of these, for each scan
 _ROUNDS = 3         # of the joint refinement, at most
@@ -51,10 +52,11 @@ def build(shop: Workshop, given: Given, ordered: bool, dof: Dof | None, seed: in
         graph.add(_related(shop, pairs, given, dof, seed))
         pairs = choice.more(graph.component)
     clock.lap("pairs")
-    _look(shop, graph)
-    while graph.check():
-        graph.add(_related(shop, choice.more(graph.component), given, dof, seed))
+    for _ in range(_CHECKS):
         _look(shop, graph)
+        if not graph.check():
+            break
+        graph.add(_related(shop, choice.more(graph.component), given, dof, seed))
     clock.lap("check")
     near = choice.add(_overlapping(graph))
     graph.add(_related(shop, near, graph.guesses(), dof, seed))
@@ -132,6 +134,10 @@ def _look(shop: Workshop, graph: Graph) -> None:
         names = [name_of(j) for j in others]
         poses = inverse(graph.poses[i]) @ graph.poses[others]
         tasks.append((i, others, Task(f"overlaps {i}", (name_of(i), *names), (name_of(i), names, poses))))
+    if len(tasks) > 1:  # along the place, so that a worker finds at hand what it has just looked at
+        places = graph.poses[[i for i, _, _ in tasks], :3, 3]
+        length = np.linalg.svd(places - places.mean(axis=0), full_matrices=False)[2][0]
+        tasks = [tasks[k] for k in np.argsort(places @ length, kind="stable")]
     found = shop.do("comparing", Overlaps(graph.unit), [task for _, _, task in tasks])
     for i, others, task in tasks:
         for j, T_ij, shares in zip(others, task.data[2], found[task.key].value or [], strict=False):

@@ -13,6 +13,8 @@ from ..motions import apply, growth, inverse, size_of, translation
 from ..prepared import PreparedCloud
 from ..surface import Surface
 
+_LOOKED_AT = 3000  # surfels, about, of which it is asked whether a sensor looked through them
+
 
 @dataclass(frozen=True, eq=False)
 class Pair:
@@ -100,7 +102,8 @@ class Pair:
         for seen, by, motion in ((self.source, self.target, T), (self.target, self.source, inverse(T))):
             if by.sight is not None:
                 surface = seen.surface(self.voxel)
-                places = apply(motion, surface.places + surface.origin)
+                some = surface.places[:: max(1, len(surface) // _LOOKED_AT)]
+                places = apply(motion, some + surface.origin)
                 shares.append(float(by.sight.looked_through(places, self.voxel).mean()))
         return max(shares, default=None)
 
