@@ -6,7 +6,7 @@ import numpy as np
 
 from fieldalign.assembly.choice import _HOPE, Choice
 
-MOST = 7  # pairs that a scan asks for
+MOST = 12  # pairs that a scan asks for
 
 
 def near(count, reach=8):

@@ -11,7 +11,7 @@ from ..fields.protocol import Floats
 
 _AT_FIRST = 3     # likeliest partners of a scan
 _THEN = 2         # more of them in each round, for scans whose component is not whole
-_MOST = 7         # pairs that a scan asks for, of those that glances propose
+_MOST = 12        # pairs that a scan asks for, of those that glances propose
 _FEW = 12         # scans of which all pairs are tried
 _HOPE = 0.005     # the score of a glance that is worth a try
 
@@ -40,10 +40,13 @@ class Choice:
         return pairs + self._likeliest(scans, np.ones_like(self._likeness, bool), _AT_FIRST)
 
     def more(self, component: NDArray[np.int64]) -> Pairs:
-        """The next likeliest partners in other components (n,); none where all are joined or none is left to ask."""
-        scans = np.flatnonzero(self._known & (self._asked < _MOST))
-        if len(np.unique(component[self._known])) < 2:
+        """The next likeliest partners in other components (n,), for the scans outside the largest one; none where all
+        are joined or none is left to ask."""
+        numbers, sizes = np.unique(component[self._known], return_counts=True)
+        if len(numbers) < 2:
             return []
+        outside = component != numbers[sizes.argmax()]
+        scans = np.flatnonzero(self._known & outside & (self._asked < _MOST))
         return self._likeliest(scans, component[:, None] != component[None], _THEN)
 
     def _likeliest(self, scans: NDArray[np.int64], may: NDArray[np.bool_], count: int) -> Pairs:
