@@ -121,6 +121,16 @@ def orthonormal(T: Matrix) -> Matrix:
     return rigid
 
 
+def best_motion(places: Matrix, onto: Matrix) -> Matrix:
+    """The motion (4, 4) that lays places (n, 3) on others with the least sum of squares (Kabsch, Acta Cryst. 1976);
+    about a line that all of them lie on, it turns by anything."""
+    middle, onto_middle = places.mean(axis=0), onto.mean(axis=0)
+    T = np.eye(4)
+    T[:3, :3] = nearest_rotation(np.einsum("ni,nj->ij", onto - onto_middle, places - middle))
+    T[:3, 3] = onto_middle - T[:3, :3] @ middle
+    return T
+
+
 def quaternions_of(R: Matrix) -> Matrix:
     """Unit quaternions (B, 4), scalar first, of rotations (B, 3, 3)."""
     xx, yy, zz = R[:, 0, 0], R[:, 1, 1], R[:, 2, 2]

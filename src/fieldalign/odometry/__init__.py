@@ -1,0 +1,1 @@
+"""Odometry: a stream of scans becomes a trajectory and a map."""
