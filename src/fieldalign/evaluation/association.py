@@ -25,7 +25,7 @@ def associated(truth: Trajectory, other: Trajectory, max_difference: float = 0.0
         other_rows, rows = _matches(other.times, truth.times, max_difference)
     if not len(rows):
         raise ArgumentError(f"no pose lies within {max_difference} s of one of the truth: {_span(other)}, "
-                            f"{_span(truth)} of the truth (KITTI's files hold no times, so theirs are the frames' numbers)")
+                            f"{_span(truth)} of the truth (KITTI's files hold none: there they are frame numbers)")
     return truth[rows], other[other_rows]
 
 

@@ -14,7 +14,6 @@ from .pose_error import PoseErrors
 from .relative import relative_errors
 from .segments import SegmentErrors, segment_errors
 
-
 _ALIGNED = {"positions": "aligned by all positions", "origin": "aligned by the first pose", "none": "not aligned"}
 
 
