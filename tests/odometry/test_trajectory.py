@@ -76,7 +76,9 @@ def test_what_is_no_trajectory_is_refused(times, poses, covariances, words):
 @pytest.mark.parametrize("asked", ["tum", "auto"])
 def test_tum_is_read_back(trajectory, tmp_path, asked):
     write_trajectory(tmp_path / "drive.txt", trajectory)
-    assert_equal_to(read_trajectory(tmp_path / "drive.txt", asked), trajectory, trajectory.times)
+    back = read_trajectory(tmp_path / "drive.txt", asked)
+    assert_equal_to(back, trajectory, trajectory.times)
+    assert back.has_times
 
 
 @pytest.mark.parametrize("asked", ["kitti", "auto"])
@@ -85,6 +87,8 @@ def test_kitti_is_read_back_exactly_but_for_the_times(trajectory, tmp_path, aske
     back = read_trajectory(tmp_path / "drive.txt", asked)
     assert np.array_equal(back.poses, trajectory.poses)
     assert np.array_equal(back.times, np.arange(50))
+    assert not back.has_times
+    assert not back[3:5].has_times
 
 
 def test_evo_reads_the_same(trajectory, tmp_path):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import sys
+from pathlib import Path
+from typing import Any, Protocol
 
 import click
 import numpy as np
@@ -14,7 +16,19 @@ from ..errors import ArgumentError
 from ..whole_file import replacing
 
 
-def write_json(result: fa.RegistrationResult | fa.Deviation, path: str | None) -> None:
+class Told(Protocol):
+    """What can be told as JSON: a RegistrationResult, a Deviation, an Evaluation."""
+
+    def to_dict(self) -> dict[str, Any]: ...  # noqa: D102
+
+
+def check_json(path: str | None) -> None:
+    """Raises where JSON cannot be written to a path."""
+    if path is not None and not Path(path).absolute().parent.is_dir():
+        raise ArgumentError(f"{path} cannot be written: there is no folder {Path(path).parent}")
+
+
+def write_json(result: Told, path: str | None) -> None:
     """Writes the result to a file, whole or not at all; nothing for None and for "-", which is stdout."""
     if path is None or path == "-":
         return
@@ -34,7 +48,7 @@ def tell(result: fa.RegistrationResult, json_path: str | None) -> int:
     return 0 if result.accepted else 3
 
 
-def as_json(result: fa.RegistrationResult | fa.Deviation) -> str:
+def as_json(result: Told) -> str:
     """The result as JSON."""
     return json.dumps(result.to_dict(), indent=1)
 

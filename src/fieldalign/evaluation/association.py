@@ -17,15 +17,21 @@ def associated(truth: Trajectory, other: Trajectory, max_difference: float = 0.0
     of the other one, if it lies within max_difference (seconds).
 
     As evo pairs them, to the last row: of two equally near ones the earlier; of two that are of one length, `other`
-    looks up its poses in `truth`. Raises ArgumentError where none belong together.
+    looks up its poses in `truth`. Where neither has times, the frames' numbers are compared.
+
+    Raises ArgumentError where none belong together, and where only one of both has times.
     """
+    if truth.has_times != other.has_times:
+        names = ("the truth", "the trajectory")[:: 1 if truth.has_times else -1]
+        raise ArgumentError(f"{names[0]} has times, but {names[1]} has none (files in KITTI's format hold none): they "
+                            "can be compared row for row only")
     if len(other) > len(truth):
         rows, other_rows = _matches(truth.times, other.times, max_difference)
     else:
         other_rows, rows = _matches(other.times, truth.times, max_difference)
     if not len(rows):
         raise ArgumentError(f"no pose lies within {max_difference} s of one of the truth: {_span(other)}, "
-                            f"{_span(truth)} of the truth (KITTI's files hold none: there they are frame numbers)")
+                            f"{_span(truth)} of the truth")
     return truth[rows], other[other_rows]
 
 

@@ -18,10 +18,10 @@ _LOOSEST = 1e-3  # that R R^T may differ from the identity: files of other tools
 class Trajectory:
     """The poses of a sensor in the order of its frames; nothing is changed or dropped on the way in.
 
-    times: (n,), seconds; the frames' numbers where nothing tells the time, as in KITTI's files of poses. A clock that
-        jumped makes times that do not grow.
+    times: (n,), seconds. A clock that jumped makes times that do not grow.
     poses: (n, 4, 4), world_from_sensor.
     covariances: (n, 6, 6) or None, of each pose; twist order (w, v).
+    has_times: False where nothing tells the time, as in KITTI's files of poses; then times are the frames' numbers.
 
     Raises ArgumentError where a shape does not fit, a value is not finite or a pose is not rigid.
     """
@@ -29,6 +29,7 @@ class Trajectory:
     times: Matrix
     poses: Matrix
     covariances: Matrix | None = None
+    has_times: bool = True
 
     def __post_init__(self) -> None:
         times, poses = _numbers(self.times, "times"), _numbers(self.poses, "poses")
@@ -50,7 +51,7 @@ class Trajectory:
     def __getitem__(self, rows: Any) -> Trajectory:
         """The poses of an index array, slice or mask."""
         covariances = None if self.covariances is None else self.covariances[rows]
-        return Trajectory(self.times[rows], self.poses[rows], covariances)
+        return Trajectory(self.times[rows], self.poses[rows], covariances, self.has_times)
 
     @property
     def positions(self) -> Matrix:

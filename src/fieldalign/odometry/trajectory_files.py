@@ -35,9 +35,10 @@ def read_trajectory(path: str | os.PathLike[str], format: str = "auto") -> Traje
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "it is no text"
         raise ArgumentError(f"{path} cannot be read as a trajectory: {reason}") from error
-    times, poses = _from_tum(rows, path) if rows.shape[1] == COLUMNS["tum"] else _from_kitti(rows)
+    has_times = rows.shape[1] == COLUMNS["tum"]
+    times, poses = _from_tum(rows, path) if has_times else _from_kitti(rows)
     try:
-        return Trajectory(times, poses)
+        return Trajectory(times, poses, has_times=has_times)
     except ArgumentError as error:
         raise ArgumentError(f"{path} is no trajectory: {error}") from error
 
