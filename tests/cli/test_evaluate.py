@@ -97,6 +97,18 @@ def test_a_plot_is_drawn(call, scans):
     assert (scans[0] / "plot.svg").read_bytes().startswith(b"<?xml")
 
 
+def test_a_cameras_drive_is_drawn_from_above(call, scans, monkeypatch):
+    """Not along the axis that the camera looks along."""
+    module = pytest.importorskip("fieldalign.reports.trajectory_picture")
+    drawn = []
+    monkeypatch.setattr(module, "trajectory_picture", lambda *args: drawn.extend(args))
+    assert call("evaluate", "kitti.txt", "camera.txt", "--calib", "calib.txt", "--plot", "plot.png")[0] == 0
+    truth = scans[1][1]
+    T = inverse(T_CAMERA_LIDAR)
+    expected = truth.positions + truth.poses[:, :3, :3] @ T[:3, 3]  # the camera's places in the lidar's world
+    np.testing.assert_allclose(drawn[2].positions, expected, atol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("args", "words"),
     [

@@ -5,10 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
+import numpy as np
 
 from ..evaluation import evaluate
 from ..evaluation.absolute import ALIGNMENTS
 from ..evaluation.relative import UNITS
+from ..motions import inverse
 from ..odometry.sequences.kitti import read_calibration
 from ..odometry.trajectory_files import FORMATS, read_trajectory
 from .answers import as_json, check_json, write_json
@@ -57,9 +59,8 @@ def command(
     """
     check_picture(plot)
     check_json(json_path)
-    found = read_trajectory(trajectory, form)
-    if calib is not None:
-        found = found.of_sensor(read_calibration(calib))
+    T_camera_sensor = np.eye(4) if calib is None else read_calibration(calib)
+    found = read_trajectory(trajectory, form).of_sensor(T_camera_sensor)
     evaluation = evaluate(
         found, read_trajectory(truth, truth_format), max_difference=None if by_row else max_difference,
         alignment=align, delta=int(delta) if unit == "frames" and delta.is_integer() else delta, unit=unit,
@@ -68,7 +69,9 @@ def command(
     if plot is not None:
         from ..reports.trajectory_picture import trajectory_picture
 
-        trajectory_picture(evaluation.trajectory, plot, evaluation.truth, f"{Path(trajectory).name} and the truth")
+        # A camera looks along z; in the lidar's world, z is up.
+        drawn, truly = (way.in_world(inverse(T_camera_sensor)) for way in (evaluation.trajectory, evaluation.truth))
+        trajectory_picture(drawn, plot, truly, f"{Path(trajectory).name} and the truth")
     write_json(evaluation, json_path)
     click.echo(as_json(evaluation) if json_path == "-" else str(evaluation))
     return 0
