@@ -7,6 +7,7 @@ import pytest
 
 import fieldalign as fa
 from fieldalign.evaluation import absolute_errors, associated, evaluate, relative_errors, segment_errors
+from fieldalign.evaluation.relative import pairs_apart
 from fieldalign.motions import exp_twist, inverse
 from fieldalign.odometry.trajectory import Trajectory
 
@@ -113,6 +114,17 @@ def test_relative_errors_are_those_of_evo(drive, evo, delta, unit, all_pairs):
     assert_equal_to(errors, evos_errors(evo, evo.metrics.RPE, evo.path(truth), evo.path(poses), **options))
 
 
+@pytest.mark.parametrize("all_pairs", [False, True])
+@pytest.mark.parametrize("delta", [5.0, 10.5])
+def test_pairs_that_are_just_delta_apart_and_equally_near_are_those_of_evo(evo, delta, all_pairs):
+    from evo.core.filters import filter_pairs_by_path
+
+    straight = np.tile(np.eye(4), (60, 1, 1))
+    straight[:, 0, 3] = np.arange(60)
+    expected = filter_pairs_by_path(list(straight), delta, 0.1 * delta, all_pairs)
+    assert np.transpose(pairs_apart(straight, delta, "metres", all_pairs)).tolist() == [list(pair) for pair in expected]
+
+
 def test_relative_errors_know_no_world(drive):
     truth, poses = drive
     T = exp_twist(np.array([1.0, 2.0, -1.0, 30.0, 20.0, 10.0]))
@@ -145,6 +157,7 @@ CLOCKS = {
     "halfway": (np.array([1.0, 2.0, 3.0]), np.array([0.995, 1.005, 2.995, 3.005])),
     "twice": (np.array([1.0, 1.0, 2.0, 2.0, 3.0]), np.array([1.0, 2.0, 2.0, 2.5])),
     "a clock that jumped": (np.array([1.0, 2.0, 3.0, 0.5, 1.5]), np.array([0.5, 1.0, 1.5, 2.0, 3.0, 4.0])),
+    "one length": (np.array([1.0, 1.006]), np.array([1.001, 1.002])),
     "one": (np.array([5.0]), np.array([1.0, 4.995, 5.004])),
     "one longer": (np.array([1.0, 4.995, 5.004]), np.array([5.0])),
 }

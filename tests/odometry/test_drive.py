@@ -56,7 +56,7 @@ def sequence_of(clouds, stamps=None, stop_at=None):
     def frames():
         for k, cloud in enumerate(clouds):
             if k == stop_at:
-                os.kill(os.getpid(), signal.SIGINT)
+                signal.raise_signal(signal.SIGINT)
             stamp = None if stamps is None else stamps[k]
             is_there = not isinstance(cloud, str)
             yield Frame(k, stamp, cloud if is_there else None, "" if is_there else cloud)
@@ -182,8 +182,8 @@ def test_an_interrupted_drive_is_whole_up_to_there(clouds, odometry, tmp_path):
 
 def test_a_second_interrupt_ends_at_once(clouds, odometry, tmp_path):
     def twice(finished, of):
-        os.kill(os.getpid(), signal.SIGINT)
-        os.kill(os.getpid(), signal.SIGTERM)
+        signal.raise_signal(signal.SIGINT)
+        signal.raise_signal(signal.SIGTERM)
 
     with pytest.raises(KeyboardInterrupt):
         drive.run(sequence_of(clouds), odometry, tmp_path, twice)
