@@ -234,6 +234,7 @@ constexpr const char* kThinDoc = "Mean (m, 3), first row (m,) and number (m,) of
 
 namespace fieldalign {
 void bind_search(nb::module_& m);
+void bind_odometry(nb::module_& m);
 }
 
 NB_MODULE(_core, m) {
@@ -270,5 +271,6 @@ NB_MODULE(_core, m) {
         "The twist (6,) that minimises sum |J x + r|, and the weights (n,) it ends with.");
   m.def("information", &information, "J"_a, "w"_a, "sum w J^T J (6, 6), over rows (n, 6), (n,).");
   bind_search(m);
+  bind_odometry(m);
   m.def("count_equal", &count_equal, "points"_a, "For each point (n, 3), how many of them equal it.");
 }

@@ -59,6 +59,18 @@ inline Motion operator*(const Motion& a, const Motion& b) {
   return product;
 }
 
+// Log of a motion: the twist (w, v) that generates it, turning by less than pi; exact but for turns within 1e-3 of pi.
+inline std::array<double, 6> log_motion(const Motion& m) {
+  const Vec3 axial = 0.5 * Vec3{m.R[7] - m.R[5], m.R[2] - m.R[6], m.R[3] - m.R[1]};
+  const double sine = std::sqrt(dot(axial, axial)), cosine = (m.R[0] + m.R[4] + m.R[8] - 1) / 2;
+  const double angle = std::atan2(sine, cosine), half = angle / 2;
+  const Vec3 w = (sine > 1e-8 ? angle / sine : 1.0) * axial;
+  // v solves V v = t, where V is the left Jacobian of w (Barfoot, State Estimation for Robotics, 7.1.3).
+  const double share = angle < 1e-4 ? 1.0 / 12 : (1 - half / std::tan(half)) / (angle * angle);
+  const Vec3 turned = cross(w, m.t), v = m.t - 0.5 * turned + share * cross(w, turned);
+  return {w.x, w.y, w.z, v.x, v.y, v.z};
+}
+
 // Which motions D = left G right, or the inverse of that, are allowed: as a quaternion and a shift they have zeros where
 // they are not free.
 struct Freedoms {

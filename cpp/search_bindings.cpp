@@ -7,6 +7,7 @@
 #include "motion.hpp"
 #include "search.hpp"
 #include "sight.hpp"
+#include "step_arrays.hpp"
 #include "surfels.hpp"
 
 namespace fieldalign {
@@ -45,22 +46,6 @@ Pose pose_of(const double* T) {
     for (int c = 0; c < 3; ++c) pose.R[3 * r + c] = static_cast<float>(T[4 * r + c]);
   pose.t = narrow({T[3], T[7], T[11]});
   return pose;
-}
-
-constexpr std::size_t kTotals = 4;
-
-// H (b, N, N), g (b, N), and for each pose sum of weights, weighted squares, curvature and how many were kept (b, 4).
-template <int N>
-nb::tuple arrays_of(const std::vector<StepSums<N>>& sums) {
-  const std::size_t b = sums.size(), n = N;
-  std::vector<double> H, g, totals;
-  for (const StepSums<N>& s : sums) {
-    g.insert(g.end(), s.g.begin(), s.g.end());
-    for (int i = 0; i < N; ++i)
-      for (int j = 0; j < N; ++j) H.push_back(s.H[std::min(i, j)][std::max(i, j)]);
-    totals.insert(totals.end(), {s.weights, s.squares, s.curvature, static_cast<double>(s.kept)});
-  }
-  return nb::make_tuple(array(std::move(H), {b, n, n}), array(std::move(g), {b, n}), array(std::move(totals), {b, kTotals}));
 }
 
 // For each pose and each place near the grid's surface: take(pose's row, place's row, place moved, normal moved, plane).
@@ -112,13 +97,6 @@ Array<double> grid_agreement(const ClosestGrid& grid, Points<double> places, Poi
   for (const AgreementSums& s : sums)
     shares.insert(shares.end(), {s.agreeing, s.met, static_cast<double>(s.on) / static_cast<double>(n)});
   return array(std::move(shares), {b, 3});
-}
-
-template <std::size_t N>
-Array<double> array_of(const std::array<std::array<double, N>, N>& A) {
-  std::vector<double> flat;
-  for (const auto& row : A) flat.insert(flat.end(), row.begin(), row.end());
-  return array(std::move(flat), {N, N});
 }
 
 // One pose, whose pseudo points are moved already and whose planes are known; seven freedoms, the last a growth. The scale of the residuals is their own:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from numpy import float32, float64, int64, uint32
+from numpy import float32, float64, int32, int64, uint32
 from numpy.typing import NDArray
 
 Floats = NDArray[float64]
@@ -168,3 +168,60 @@ def coplanar(
 
 def take_steps(poses: Floats, H: Floats, g: Floats, stretch: Floats, largest_turn: float) -> tuple[Floats, Floats]:
     """Twists -stretch H^+ g (b, 6), turning by at most largest_turn, and the poses (b, 4, 4) that they lead to."""
+
+Scan = NDArray[float32]  # (n, 4): a place in the sensor's frame, and seconds from the moment of the scan's pose
+Cells = NDArray[int32]
+
+def thin_scan(
+    points: Points, times: Floats | None, moment: float, stride: int, voxel: float, nearest: float, farthest: float
+) -> Scan:
+    """Of every stride-th point (n, 3) the first in each voxel, between two ranges; times (n,) are counted from the
+    moment. Points that are not finite are left out."""
+
+def thin_again(scan: Scan, voxel: float) -> Scan:
+    """The first point of a scan in each voxel."""
+
+def deskew(scan: Scan, twist: Floats) -> Scan:
+    """Each point as seen at the moment of the pose, by a sensor that moves at a steady twist (6,) a second."""
+
+class VoxelMap:
+    """A map that grows: voxels, in each of them the plane of its points."""
+
+    def __init__(self, voxel: float) -> None: ...
+    def __len__(self) -> int: ...
+    def add(self, scan: Scan, pose: Floats, most: float) -> None:
+        """A scan seen from a pose (4, 4) enters the voxels' sums, but for voxels of `most` points, which are full."""
+    def keep_within(self, centre: Floats, radius: float) -> int:
+        """Leaves the voxels within a radius of a place (3,), and returns how many they are."""
+    def match(self, scan: Scan, pose: Floats, origin: Floats, fewest: float, is_wide: bool) -> Cells:
+        """The cells (n,) that pseudo points come to lie in, moved by a pose (4, 4) about the origin (3,), or of six
+        neighbours the nearest; -1 where none holds so many points. A wide match takes the nearest of eight."""
+    def sums(
+        self,
+        scan: Scan,
+        cells: Cells,
+        pose: Floats,
+        origin: Floats,
+        deviations: float,
+        least_scale: float,
+        gate: float,
+        thickness: float,
+        flatness: float,
+        is_whole: bool,
+    ) -> tuple[tuple[Floats, Floats, Floats], float, int, int]:
+        """As ClosestGrid.robust_sums, of one pose about the origin; then the scale, and how many pseudo points have a
+        plane, and lie on it."""
+    def certainty(
+        self,
+        scan: Scan,
+        cells: Cells,
+        pose: Floats,
+        origin: Floats,
+        scale: float,
+        gate: float,
+        thickness: float,
+        flatness: float,
+    ) -> tuple[Floats, Floats]:
+        """What holds the pose (6, 6), free of the normals' noise, and the scatter (6, 6) of the gradient."""
+    def planes(self, fewest: float) -> tuple[Floats, Floats, Floats]:
+        """Means (n, 3), normals (n, 3) and numbers (n,) of points of the cells that hold so many."""

@@ -1,0 +1,120 @@
+"""One scan, made ready: few points of it for the map, fewer pseudo points to be aligned."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .. import _core
+from ..clouds.cloud import PointCloud, as_points
+from ..errors import ArgumentError
+from ..fields.protocol import Floats
+from ..scale import scale_of
+from .settings import OdometrySettings
+
+Rows = NDArray[np.float32]  # (., 4): a place in the sensor's frame, and seconds from the middle of the sweep
+
+_CELLS = 1500        # that a scan's surface fills at the map's voxel
+_THINNING = 0.4      # voxels: points for the map lie no closer
+_FEWEST = 50         # pseudo points: with fewer, a scan counts as empty
+_RANGES = 1000       # points that the range is read from
+_FAR = 1.5           # of the range of nearly all points: what lies farther is no surface that will be seen again
+_NEAR = 0.5          # voxels: what is nearer is the sensor itself, or a missing return written as zero
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """Points (N, 3) of a scan as they came, and when they were seen.
+
+    times: (N,), seconds, or None. middle: of the sweep, on the times' clock; without them the stamp, or None.
+    span: from its first to its last point. stamp: the moment that the pose is wanted for, or None.
+    """
+
+    points: NDArray[Any]
+    times: Floats | None
+    middle: float | None
+    span: float
+    stamp: float | None
+
+
+@dataclass(frozen=True)
+class Measure:
+    """The lengths of a drive, read from its scans: the edge of a voxel, and the range beyond which nothing is used."""
+
+    voxel: float
+    range: float
+
+
+@dataclass(frozen=True, eq=False)
+class Scan:
+    """points: (M, 4) for the map. pseudo: (L, 4), on the scan's surface: their own distance is zero by construction."""
+
+    points: Rows
+    pseudo: Rows
+    is_timed: bool
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether there is too little to be aligned."""
+        return len(self.pseudo) < _FEWEST
+
+    def all_at_once(self) -> Scan:
+        """The same as if the times were not known."""
+        return Scan(self.points, self.pseudo, False)
+
+    def at_once(self, velocity: Floats) -> Rows:
+        """The map's points (M, 4) as seen in the middle of the sweep, the sensor moving at a twist (6,) a second."""
+        return _core.deskew(self.points, velocity) if self.is_timed else self.points
+
+
+def sweep_of(cloud: PointCloud | ArrayLike, times: ArrayLike | None, stamp: float | None) -> Sweep:
+    """The scan with its times, counted from the stamp where they are not near it. Raises ArgumentError."""
+    points = cloud.points if isinstance(cloud, PointCloud) else as_points(cloud, "cloud")
+    if times is None and isinstance(cloud, PointCloud):
+        times = cloud.times
+    if times is None or not len(points):
+        return Sweep(points, None, stamp, 0.0, stamp)
+    seconds = np.ascontiguousarray(times, float)
+    if seconds.shape != (len(points),):
+        raise ArgumentError(f"times must have shape ({len(points)},), one for each point, but has {seconds.shape}")
+    first, last = float(seconds.min()), float(seconds.max())
+    if not np.isfinite(first + last):
+        raise ArgumentError("times must be finite, but hold NaN or infinity")
+    span = last - first
+    if stamp is not None and not first - span <= stamp <= last + span:
+        seconds, first, last = seconds + stamp, first + stamp, last + stamp
+    return Sweep(points, seconds, (first + last) / 2, span, stamp)
+
+
+def measure_of(sweep: Sweep, voxel: float | None) -> Measure | None:
+    """The lengths that a first scan tells; None where it has too few points to tell any."""
+    seen = sweep.points[np.isfinite(sweep.points).all(axis=1) & (sweep.points != 0).any(axis=1)]
+    if len(seen) < _FEWEST or not np.ptp(seen, axis=0).any():
+        return None
+    return Measure(voxel or scale_of(np.ascontiguousarray(seen), 1, _CELLS).voxel, range_of(sweep))
+
+
+def range_of(sweep: Sweep) -> float:
+    """The range (length) within which nearly all points lie, and half as much again; 0 where there are none."""
+    sample = np.asarray(sweep.points[:: max(1, len(sweep.points) // _RANGES)], float)
+    ranges = np.sqrt((sample**2).sum(axis=1))
+    ranges = ranges[np.isfinite(ranges) & (ranges > 0)]
+    return float(_FAR * np.quantile(ranges, 0.99)) if len(ranges) else 0.0
+
+
+def thin_scan(sweep: Sweep, measure: Measure, settings: OdometrySettings, deskew: bool) -> Scan:
+    """Points for the map, one in 0.4 voxels, and of these pseudo points, one in a voxel."""
+    # An odd stride meets every beam, where points come one beam after the other.
+    stride = len(sweep.points) // settings.points | 1
+    kept = _core.thin_scan(
+        sweep.points, sweep.times if deskew else None, sweep.middle or 0.0, stride, _THINNING * measure.voxel,
+        _NEAR * measure.voxel, measure.range,
+    )
+    pseudo = _core.thin_again(kept, measure.voxel)
+    wanted = settings.pseudo_points
+    if len(pseudo) > wanted:
+        pseudo = pseudo[np.arange(wanted) * len(pseudo) // wanted]
+    return Scan(kept, pseudo, deskew and sweep.times is not None)
