@@ -167,6 +167,11 @@ Array<double> exponential(Values twist) {
   return array(std::vector<double>(T.begin(), T.end()), {4, 4});
 }
 
+Array<double> logarithm(nb::ndarray<const double, nb::shape<4, 4>, nb::c_contig, nb::device::cpu> T) {
+  const auto twist = log_motion(motion_of(T.data()));
+  return array(std::vector<double>(twist.begin(), twist.end()), {6});
+}
+
 Array<double> directions(Values value, Points<double> gradient) {
   if (value.shape(0) != gradient.shape(0)) throw std::invalid_argument("value and gradient differ in length");
   std::vector<double> unit(gradient.shape(0) * 3);
@@ -264,6 +269,7 @@ NB_MODULE(_core, m) {
   m.def("occupancy", &occupancy_of<double>, "points"_a.noconvert(), "most"_a, "threads"_a, kOccupancyDoc);
   m.def("transform", &transform_points, "R"_a, "t"_a, "points"_a, "R (3, 3) times each of points (n, 3), plus t (3,).");
   m.def("exp_twist", &exponential, "twist"_a, "The motion (4, 4) that a twist (w, v) (6,) generates.");
+  m.def("log_motion", &logarithm, "T"_a, "The twist (w, v) (6,) that generates a motion (4, 4).");
   m.def("directions", &directions, "value"_a, "gradient"_a, "Unit vectors (n, 3) away from the feet; zero without any.");
   m.def("moment_rows", &moments, "x"_a, "g"_a, "Rows (n, 6) of x cross g, then g, of x and g (n, 3).");
   m.def("direct", &direct, "J"_a, "r"_a, "The twist (6,) that minimises |J x + r|^2 over rows (n, 6), (n,).");

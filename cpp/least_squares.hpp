@@ -52,6 +52,15 @@ inline Twist solve(const NormalEquations& sums) {
   return x;
 }
 
+// A step, lengthened, but turning by no more than so far.
+inline Twist limited(Twist x, double stretch, double largest_turn) {
+  for (double& part : x) part *= stretch;
+  const double turn = std::sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]);
+  if (turn > largest_turn)
+    for (double& part : x) part *= largest_turn / turn;
+  return x;
+}
+
 struct Reweighting {
   double floor;      // residuals below it are weighted alike
   double unit;       // the length that counts as much as a radian in the rule for stopping

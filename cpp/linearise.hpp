@@ -6,6 +6,7 @@
 // Jacobian for a twist (w, v) on the pose's left is [x cross N, N]; for a growth of x by exp(g) it is x.N, the seventh.
 #pragma once
 
+#include <algorithm>
 #include <limits>
 #include <optional>
 
@@ -53,6 +54,12 @@ std::array<double, N> row_of(Vec3 place, Vec3 normal) {
   return row;
 }
 
+// By how much to lengthen reweighted steps: the loss bends less than its weights say (Huber, Robust Statistics, 7.8), and
+// the steps come out short by about a third. Never so long that one ends as far beyond the end.
+inline double stretch_of(double weights, double curvature) {
+  return 1 / std::clamp(curvature / std::max(weights, 1e-300), 0.6, 1.0);
+}
+
 // What one pose's pseudo points add up to for its next step.
 template <int N>
 struct StepSums {
@@ -77,6 +84,7 @@ struct StepSums {
     curvature += w * (4 / (1 + z * z) - 3);
     ++kept;
   }
+  double stretch() const { return stretch_of(weights, curvature); }
 };
 
 // What the residuals at the end tell of the pose's certainty.

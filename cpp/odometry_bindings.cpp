@@ -11,8 +11,9 @@ using namespace nanobind::literals;
 namespace {
 
 using Scan = nb::ndarray<const float, nb::shape<-1, 4>, nb::c_contig, nb::device::cpu>;
-using Cells = nb::ndarray<const std::int32_t, nb::shape<-1>, nb::c_contig, nb::device::cpu>;
 using Pose4 = nb::ndarray<const double, nb::shape<4, 4>, nb::c_contig, nb::device::cpu>;
+
+using Pose6 = nb::ndarray<const double, nb::shape<6, 6>, nb::c_contig, nb::device::cpu>;
 
 static_assert(sizeof(ScanPoint) == 4 * sizeof(float));
 std::span<const ScanPoint> scan_of(const Scan& scan) {
@@ -65,42 +66,60 @@ Array<float> deskewed(Scan scan, Values twist) {
   return scan_array(std::move(moved));
 }
 
-// The cells (L,) that pseudo points lie in; in a wide match, that whose mean is nearest.
-Array<std::int32_t> match(VoxelMap& map, Scan scan, Pose4 pose, Values origin, double fewest, bool is_wide) {
-  const Motion T = motion_of(pose.data());
-  const Vec3 o = vector_of(origin);
-  std::vector<std::int32_t> cells;
-  cells.reserve(scan.shape(0));
-  for (const ScanPoint& p : scan_of(scan)) {
-    const Vec3 x = T.moved(p.place()) + o;
-    cells.push_back(is_wide ? map.nearest_cell(x, fewest) : map.cell_at(x, fewest));
+// A dict's numbers by their names.
+struct Numbers {
+  nb::dict values;
+  double operator()(const char* name) const { return nb::cast<double>(values[name]); }
+  int whole(const char* name) const { return nb::cast<int>(values[name]); }
+};
+
+Array<double> pose_array(const Motion& m) {
+  const auto& R = m.R;
+  return array(std::vector<double>{R[0], R[1], R[2], m.t.x, R[3], R[4], R[5], m.t.y, R[6], R[7], R[8], m.t.z, 0, 0, 0, 1},
+               {4, 4});
+}
+
+// The upper triangle as a whole matrix.
+Array<double> symmetric_array(Square<6> H) {
+  for (int a = 0; a < 6; ++a)
+    for (int b = 0; b < a; ++b) H[a][b] = H[b][a];
+  return array_of(H);
+}
+
+nb::dict tracked(VoxelMap& map, Scan scan, Pose4 start, Values origin, std::optional<Pose4> last, double seconds,
+                 std::optional<Pose6> held, bool is_whole, nb::dict settings) {
+  const Numbers s{settings};
+  TrackLoss loss{s("deviations"), s("least_scale"), s("gate"), s("thickness"), s("flatness"), is_whole};
+  const TrackSchedule schedule{s.whole("steps"), s.whole("free_steps"), s("fewest"), s("first_scale"),
+                               s("still_shift"), s("still_turn"), s("largest_turn")};
+  const Vec3 about = vector_of(origin);
+  std::optional<LastPose> before;
+  if (last) before = LastPose{motion_of(last->data()), seconds};
+  std::optional<HeldTwists> twists;
+  if (held) {
+    twists.emplace();
+    for (int i = 0; i < 6; ++i) std::copy_n(held->data() + 6 * i, 6, twists->columns[i].begin());
   }
-  const std::size_t n = cells.size();
-  return array(std::move(cells), {n});
-}
-
-std::span<const std::int32_t> checked_cells(const VoxelMap& map, const Scan& scan, const Cells& cells) {
-  check_lengths(scan.shape(0), {cells.shape(0)});
-  const std::span<const std::int32_t> all(cells.data(), cells.shape(0));
-  const auto is_known = [&](std::int32_t c) { return c >= VoxelMap::kNone && c < static_cast<std::int32_t>(map.size()); };
-  if (!std::all_of(all.begin(), all.end(), is_known)) throw std::invalid_argument("the map has no such cell");
-  return all;
-}
-
-nb::tuple sums(VoxelMap& map, Scan scan, Cells cells, Pose4 pose, Values origin, double deviations, double least_scale,
-               double gate, double thickness, double flatness, bool is_whole) {
-  const TrackLoss loss{deviations, least_scale, gate, thickness, flatness, is_whole};
-  const TrackSums found = track_sums(map, scan_of(scan), checked_cells(map, scan, cells), motion_of(pose.data()),
-                                     vector_of(origin), loss);
-  return nb::make_tuple(arrays_of(std::vector<StepSums<6>>{found.step}), found.scale, found.met, found.on);
-}
-
-nb::tuple certainty(VoxelMap& map, Scan scan, Cells cells, Pose4 pose, Values origin, double scale, double gate,
-                    double thickness, double flatness) {
-  const TrackLoss loss{0, 0, gate, thickness, flatness, false};
-  const CertaintySums<6> known = certainty_sums(map, scan_of(scan), checked_cells(map, scan, cells),
-                                                motion_of(pose.data()), vector_of(origin), loss, scale);
-  return nb::make_tuple(array_of(known.hold), array_of(known.scatter));
+  Tracked found;
+  CertaintySums<6> known;
+  {
+    nb::gil_scoped_release free;
+    found = track(map, scan_of(scan), motion_of(start.data()), about, loss, schedule, before, twists);
+    loss.gate = s("certain_gate");
+    if (!is_whole) known = certainty_sums(map, found.scan, found.cells, found.pose, about, loss, found.sums.scale);
+  }
+  nb::dict result;
+  result["motion"] = pose_array(found.pose);
+  result["points"] = found.scan.size();
+  result["met"] = found.sums.met;
+  result["on"] = found.sums.on;
+  result["iterations"] = found.steps;
+  result["scale"] = found.sums.scale;
+  result["H"] = symmetric_array(found.sums.step.H);
+  result["stretch"] = found.sums.step.stretch();
+  result["hold"] = array_of(known.hold);
+  result["scatter"] = array_of(known.scatter);
+  return result;
 }
 
 // Means (n, 3), normals (n, 3) and numbers of points (n,) of the cells that hold so many.
@@ -141,11 +160,8 @@ void bind_odometry(nb::module_& m) {
       .def("keep_within", [](VoxelMap& map, Values centre, double radius) {
              return map.keep_within(vector_of(centre), radius);
            }, "centre"_a, "radius"_a)
-      .def("match", &match, "scan"_a, "pose"_a, "origin"_a, "fewest"_a, "is_wide"_a)
-      .def("sums", &sums, "scan"_a, "cells"_a, "pose"_a, "origin"_a, "deviations"_a, "least_scale"_a, "gate"_a,
-           "thickness"_a, "flatness"_a, "is_whole"_a)
-      .def("certainty", &certainty, "scan"_a, "cells"_a, "pose"_a, "origin"_a, "scale"_a, "gate"_a, "thickness"_a,
-           "flatness"_a)
+      .def("track", &tracked, "scan"_a, "start"_a, "origin"_a, "last"_a.none(), "seconds"_a, "held"_a.none(),
+           "is_whole"_a, "settings"_a)
       .def("planes", &planes, "fewest"_a);
 }
 

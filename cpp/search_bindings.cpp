@@ -140,11 +140,7 @@ auto take_steps(Matrices4 poses, nb::ndarray<const double, nb::shape<-1, 6, 6>, 
     NormalEquations sums;
     std::copy_n(g.data() + 6 * k, 6, sums.g.begin());
     for (int i = 0; i < 6; ++i) std::copy_n(H.data() + 36 * k + 6 * i, 6, sums.H[i].begin());
-    Twist x = solve(sums);
-    for (double& part : x) part *= stretch.data()[k];
-    const double turn = std::sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]);
-    if (turn > largest_turn)
-      for (double& part : x) part *= largest_turn / turn;
+    const Twist x = limited(solve(sums), stretch.data()[k], largest_turn);
     const auto E = exp_twist({x[0], x[1], x[2]}, {x[3], x[4], x[5]});
     const double* T = poses.data() + 16 * k;
     for (int r = 0; r < 4; ++r)
@@ -153,6 +149,14 @@ auto take_steps(Matrices4 poses, nb::ndarray<const double, nb::shape<-1, 6, 6>, 
     std::copy(x.begin(), x.end(), twists.begin() + static_cast<std::ptrdiff_t>(6 * k));
   }
   return std::make_pair(array(std::move(twists), {b, 6}), array(std::move(moved), {b, 4, 4}));
+}
+
+// By how much to lengthen the steps of many poses (b,).
+Array<double> stretches(nb::ndarray<const double, nb::shape<-1, kTotals>, nb::c_contig, nb::device::cpu> totals) {
+  const std::size_t b = totals.shape(0);
+  std::vector<double> found(b);
+  for (std::size_t k = 0; k < b; ++k) found[k] = stretch_of(totals.data()[kTotals * k], totals.data()[kTotals * k + 2]);
+  return array(std::move(found), {b});
 }
 
 // For each surfel, how many of the witnesses lie in its plane (n,).
@@ -262,6 +266,7 @@ void bind_search(nb::module_& m) {
   m.attr("RUN") = kRun;
   m.def("coplanar", &coplanar, "places"_a, "normals"_a, "witness_places"_a, "witness_normals"_a, "distance"_a,
         "min_cosine"_a, "threads"_a);
+  m.def("stretch", &stretches, "totals"_a);
   m.def("take_steps", &take_steps, "poses"_a, "H"_a, "g"_a, "stretch"_a, "largest_turn"_a);
 }
 

@@ -122,4 +122,87 @@ inline CertaintySums<6> certainty_sums(VoxelMap& map, std::span<const ScanPoint>
   return known;
 }
 
+// How a pose is sought. All lengths in the map's unit.
+struct TrackSchedule {
+  int steps;            // at most
+  int free_steps;       // in which each pseudo point finds its plane anew; later, in every third
+  double fewest;        // points of a plane
+  double first_scale;   // of residuals, in the first step: the guess is off
+  double still_shift, still_turn;  // steps that are no longer end the search
+  double largest_turn;  // of a step
+};
+
+// The twists that may be told from the scan: held x, of free x; columns that are zero are not free.
+struct HeldTwists {
+  Square<6> columns;
+
+  NormalEquations within(const StepSums<6>& sums) const {
+    NormalEquations inside;
+    for (int a = 0; a < 6; ++a)
+      for (int b = 0; b < 6; ++b)
+        for (int i = 0; i < 6; ++i) {
+          for (int j = 0; j < 6; ++j)
+            inside.H[a][b] += columns[i][a] * sums.H[std::min(i, j)][std::max(i, j)] * columns[j][b];
+          if (b == 0) inside.g[a] += columns[i][a] * sums.g[i];
+        }
+    return inside;
+  }
+  Twist whole(const Twist& x) const {
+    Twist twist{};
+    for (int i = 0; i < 6; ++i)
+      for (int a = 0; a < 6; ++a) twist[i] += columns[i][a] * x[a];
+    return twist;
+  }
+};
+
+// Where the sensor was, about the origin, and how many seconds ago: what deskews a scan, given where it is now.
+struct LastPose {
+  Motion pose;
+  double seconds;
+
+  SteadyMotion until(const Motion& now) const {
+    Twist twist = log_motion(inverse(pose) * now);
+    for (double& part : twist) part /= seconds;
+    return SteadyMotion(twist.data());
+  }
+};
+
+// The step -H^+ g, within what is held, lengthened as the loss bends, but turning no more than so far.
+inline Twist step_of(const StepSums<6>& sums, double largest_turn, const std::optional<HeldTwists>& held) {
+  NormalEquations equations{sums.H, sums.g};
+  for (int a = 0; a < 6; ++a)
+    for (int b = 0; b < a; ++b) equations.H[a][b] = equations.H[b][a];
+  Twist x = held ? held->whole(solve(held->within(sums))) : solve(equations);
+  return limited(x, sums.stretch(), largest_turn);
+}
+
+struct Tracked {
+  Motion pose;
+  std::vector<ScanPoint> scan;  // as deskewed at the end
+  std::vector<std::int32_t> cells;
+  TrackSums sums;
+  int steps = 0;
+};
+
+// Gauss-Newton (paper eq. 14 to 16), from a pose about the origin.
+inline Tracked track(VoxelMap& map, std::span<const ScanPoint> scan, const Motion& start, Vec3 origin, TrackLoss loss,
+                     const TrackSchedule& schedule, const std::optional<LastPose>& last,
+                     const std::optional<HeldTwists>& held) {
+  Tracked found{start, {scan.begin(), scan.end()}, {}, {}, 0};
+  const double least_scale = loss.least_scale;
+  while (found.steps < schedule.steps) {
+    if (last && found.steps <= schedule.free_steps) deskew(scan, last->until(found.pose), found.scan.data());
+    if (found.steps < schedule.free_steps || found.steps % 3 == 0)
+      found.cells = map.match(moved(found.scan, found.pose, origin), schedule.fewest, loss.is_whole);
+    loss.least_scale = found.steps == 0 ? std::max(schedule.first_scale, least_scale) : least_scale;
+    found.sums = track_sums(map, found.scan, found.cells, found.pose, origin, loss);
+    ++found.steps;
+    const Twist x = step_of(found.sums.step, schedule.largest_turn, held);
+    found.pose = motion_of(exp_twist({x[0], x[1], x[2]}, {x[3], x[4], x[5]}).data()) * found.pose;
+    const double turn = x[0] * x[0] + x[1] * x[1] + x[2] * x[2], shift = x[3] * x[3] + x[4] * x[4] + x[5] * x[5];
+    if (turn < schedule.still_turn * schedule.still_turn && shift < schedule.still_shift * schedule.still_shift) break;
+  }
+  return found;
+}
+
 }  // namespace fieldalign

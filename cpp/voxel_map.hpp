@@ -14,6 +14,13 @@ struct MapPlane {
   double least, middle;  // variances across the plane, and along its shorter axis
 };
 
+// A scan's places, moved by a pose about an origin.
+inline std::vector<Vec3> moved(std::span<const ScanPoint> scan, const Motion& pose, Vec3 origin) {
+  std::vector<Vec3> places(scan.size());
+  for (std::size_t i = 0; i < scan.size(); ++i) places[i] = pose.moved(scan[i].place()) + origin;
+  return places;
+}
+
 class VoxelMap {
  public:
   static constexpr std::int32_t kNone = -1;
@@ -26,14 +33,27 @@ class VoxelMap {
 
   // Points enter their voxels' sums; a voxel that has `most` of them takes no more, so that it stays where it was.
   void add(std::span<const ScanPoint> scan, const Motion& pose, double most) {
-    for (const ScanPoint& p : scan) {
-      const Vec3 x = (1 / voxel_) * pose.moved(p.place());
-      const Voxel at = voxel_of(x.x, x.y, x.z);
+    const auto places = moved(scan, pose, {});
+    find_all(places);  // so that they are at hand
+    for (const Vec3 place : places) {
+      const Voxel at = voxel_at(place);
       Cell& cell = cells_[at_or_new(at)];
       if (cell.scatter.n >= most) continue;
-      cell.scatter.add(voxel_ * (x - middle_of(at)));
+      cell.scatter.add(place - voxel_ * middle_of(at));
       cell.is_fitted = false;
     }
+  }
+
+  // The cells that pseudo points come to lie in, where these hold `fewest` points; else those of their six neighbours
+  // whose mean is nearest. A wide match is by the nearest mean among the eight cells that are nearest.
+  std::vector<std::int32_t> match(const std::vector<Vec3>& places, double fewest, bool is_wide) {
+    std::vector<std::int32_t> cells = find_all(places);
+    for (std::size_t i = 0; i < places.size(); ++i)
+      if (is_wide)
+        cells[i] = nearest_of_eight(places[i], fewest);
+      else if (cells[i] == kNone || count(cells[i]) < fewest)
+        cells[i] = nearest_of_six(places[i], fewest);
+    return cells;
   }
 
   // The plane of a cell, fitted where points were added since.
@@ -46,29 +66,6 @@ class VoxelMap {
       cell.is_fitted = true;
     }
     return cell.plane;
-  }
-
-  // The cell around a place, where it holds `fewest` points; else that of its six neighbours whose mean is nearest.
-  std::int32_t cell_at(Vec3 place, double fewest) {
-    const Voxel at = voxel_at(place);
-    const std::int32_t own = find(at);
-    if (own != kNone && count(own) >= fewest) return own;
-    Nearest found{*this, place, fewest};
-    for (const int step : {-1, 1}) {
-      found.offer({at.x + step, at.y, at.z});
-      found.offer({at.x, at.y + step, at.z});
-      found.offer({at.x, at.y, at.z + step});
-    }
-    return found.cell;
-  }
-
-  // Of the eight cells around a place that are nearest, the one whose mean is.
-  std::int32_t nearest_cell(Vec3 place, double fewest) {
-    const Vec3 corner = (1 / voxel_) * place;
-    const Voxel low = voxel_of(corner.x - 0.5, corner.y - 0.5, corner.z - 0.5);
-    Nearest found{*this, place, fewest};
-    for (int k = 0; k < 8; ++k) found.offer({low.x + (k & 1), low.y + (k >> 1 & 1), low.z + (k >> 2)});
-    return found.cell;
   }
 
   // Leaves what lies within a radius; returns how many cells are left.
@@ -102,6 +99,42 @@ class VoxelMap {
       if (cell == kNone || dot(away, away) < squared) cell = other, squared = dot(away, away);
     }
   };
+
+  // The cells around places, or none; they are on their way from memory.
+  std::vector<std::int32_t> find_all(const std::vector<Vec3>& places) const {
+    std::vector<std::uint64_t> keys(places.size());
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      keys[i] = key_of(voxel_at(places[i]));
+      table_.prefetch_slot(keys[i]), prefetch(&cells_of_[table_.first_slot(keys[i])]);
+    }
+    std::vector<std::int32_t> cells(places.size());
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      cells[i] = cells_of_[table_.slot_of(keys[i])];
+      if (cells[i] == kNone) continue;
+      const char* cell = reinterpret_cast<const char*>(&cells_[cells[i]]);
+      prefetch(cell), prefetch(cell + 64), prefetch(cell + 128);
+    }
+    return cells;
+  }
+
+  std::int32_t nearest_of_six(Vec3 place, double fewest) {
+    const Voxel at = voxel_at(place);
+    Nearest found{*this, place, fewest};
+    for (const int step : {-1, 1}) {
+      found.offer({at.x + step, at.y, at.z});
+      found.offer({at.x, at.y + step, at.z});
+      found.offer({at.x, at.y, at.z + step});
+    }
+    return found.cell;
+  }
+
+  std::int32_t nearest_of_eight(Vec3 place, double fewest) {
+    const Vec3 corner = (1 / voxel_) * place;
+    const Voxel low = voxel_of(corner.x - 0.5, corner.y - 0.5, corner.z - 0.5);
+    Nearest found{*this, place, fewest};
+    for (int k = 0; k < 8; ++k) found.offer({low.x + (k & 1), low.y + (k >> 1 & 1), low.z + (k >> 2)});
+    return found.cell;
+  }
 
   static Vec3 middle_of(Voxel at) { return {at.x + 0.5, at.y + 0.5, at.z + 0.5}; }
   Voxel voxel_at(Vec3 place) const {

@@ -1,8 +1,9 @@
 """The native core of fieldalign: what loops over points."""
 
 from collections.abc import Mapping
+from typing import Any
 
-from numpy import float32, float64, int32, int64, uint32
+from numpy import float32, float64, int64, uint32
 from numpy.typing import NDArray
 
 Floats = NDArray[float64]
@@ -53,6 +54,9 @@ def transform(R: Floats, t: Floats, points: Floats) -> Floats:
 
 def exp_twist(twist: Floats) -> Floats:
     """The motion (4, 4) that a twist (w, v) (6,) generates."""
+
+def log_motion(T: Floats) -> Floats:
+    """The twist (w, v) (6,) that generates a motion (4, 4), turning by at most pi."""
 
 def directions(value: Floats, gradient: Floats) -> Floats:
     """Unit vectors (n, 3) away from the feet; zero where there is no gradient."""
@@ -166,11 +170,13 @@ def coplanar(
     """For each surfel (n, 3), how many of the witnesses (m, 3) lie within `distance` of its plane, their normals within
     an angle of this cosine (n,)."""
 
+def stretch(totals: Floats) -> Floats:
+    """By how much to lengthen the steps that totals (b, 4) of robust_sums belong to (b,)."""
+
 def take_steps(poses: Floats, H: Floats, g: Floats, stretch: Floats, largest_turn: float) -> tuple[Floats, Floats]:
     """Twists -stretch H^+ g (b, 6), turning by at most largest_turn, and the poses (b, 4, 4) that they lead to."""
 
 Scan = NDArray[float32]  # (n, 4): a place in the sensor's frame, and seconds from the moment of the scan's pose
-Cells = NDArray[int32]
 
 def thin_scan(
     points: Points, times: Floats | None, moment: float, stride: int, voxel: float, nearest: float, farthest: float
@@ -193,35 +199,22 @@ class VoxelMap:
         """A scan seen from a pose (4, 4) enters the voxels' sums, but for voxels of `most` points, which are full."""
     def keep_within(self, centre: Floats, radius: float) -> int:
         """Leaves the voxels within a radius of a place (3,), and returns how many they are."""
-    def match(self, scan: Scan, pose: Floats, origin: Floats, fewest: float, is_wide: bool) -> Cells:
-        """The cells (n,) that pseudo points come to lie in, moved by a pose (4, 4) about the origin (3,), or of six
-        neighbours the nearest; -1 where none holds so many points. A wide match takes the nearest of eight."""
-    def sums(
+    def track(
         self,
         scan: Scan,
-        cells: Cells,
-        pose: Floats,
+        start: Floats,
         origin: Floats,
-        deviations: float,
-        least_scale: float,
-        gate: float,
-        thickness: float,
-        flatness: float,
+        last: Floats | None,
+        seconds: float,
+        held: Floats | None,
         is_whole: bool,
-    ) -> tuple[tuple[Floats, Floats, Floats], float, int, int]:
-        """As ClosestGrid.robust_sums, of one pose about the origin; then the scale, and how many pseudo points have a
-        plane, and lie on it."""
-    def certainty(
-        self,
-        scan: Scan,
-        cells: Cells,
-        pose: Floats,
-        origin: Floats,
-        scale: float,
-        gate: float,
-        thickness: float,
-        flatness: float,
-    ) -> tuple[Floats, Floats]:
-        """What holds the pose (6, 6), free of the normals' noise, and the scatter (6, 6) of the gradient."""
+        settings: Mapping[str, float],
+    ) -> dict[str, Any]:
+        """Where pseudo points (n, 4) come to lie, from a pose (4, 4) about the origin (3,), by Gauss-Newton.
+
+        last: the pose (4, 4) about the origin, so many seconds ago: then the scan is deskewed. held: (6, 6), its
+        columns are the twists that may be told from the scan. is_whole: voxels that are no planes hold, too, and planes
+        along themselves. The answer holds motion (4, 4), H, hold and scatter (6, 6), stretch, scale, points, met (that
+        have a plane), on (that lie on it), and iterations."""
     def planes(self, fewest: float) -> tuple[Floats, Floats, Floats]:
         """Means (n, 3), normals (n, 3) and numbers (n,) of points of the cells that hold so many."""

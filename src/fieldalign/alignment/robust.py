@@ -18,7 +18,7 @@ from ..surface import Surface
 from .agreement import MIN_COSINE, Apart, agreement, best_distinct, both_ways, mutual_score
 from .residual import row_dot
 from .solver import Step, descend
-from .steps import LARGEST_TURN, minimisers, stretch_of, take_steps
+from .steps import LARGEST_TURN, minimisers, take_steps
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class GridStage:
     def step(self, poses: Floats) -> tuple[Floats, Step]:
         """A Gauss-Newton step of every pose."""
         H, g, totals = self.grid.robust_sums(self.places, self.normals, self.offsets, poses, *self.loss, self.threads)
-        twists, poses = take_steps(poses, H, g, stretch_of(totals), self.allowed)
+        twists, poses = take_steps(poses, H, g, _core.stretch(totals), self.allowed)
         return poses, Step(twists[0], _rms(totals[0]), int(totals[0, 3]))
 
     def is_still(self, step: Step) -> bool:
@@ -134,7 +134,7 @@ class FieldStage:
         self.H, self.gradient, self.totals = H[0], g[0], totals[0]
         # Far from the end the scale shrinks with the residuals, and a longer step would leap over the end for ever.
         turns_back = g[0] @ self.increment > 0
-        stretch = np.ones(1) if turns_back else stretch_of(totals)
+        stretch = np.ones(1) if turns_back else _core.stretch(totals)
         self.increment = np.zeros(7)
         if self.grows:
             poses = self._grown(poses, H, g, stretch)
@@ -180,14 +180,14 @@ class FieldStage:
     @property
     def curvature(self) -> Floats:
         """Derivative (7, 7) of the gradient by a twist and a growth: H, less what the loss bends."""
-        return np.asarray(self.H / stretch_of(self.totals[None]))
+        return np.asarray(self.H / _core.stretch(self.totals[None]))
 
     @property
     def gradient_scatter(self) -> Floats:
         """Covariance (7, 7) of the gradient: from runs of neighbouring pseudo points, and where these are few, from the
         residuals as if each were independent."""
         runs = self.totals[3] / _core.RUN
-        independent = (self.rmse**2 + (1e-12 * self.extent) ** 2) / stretch_of(self.totals[None]) ** 2 * self.H
+        independent = (self.rmse**2 + (1e-12 * self.extent) ** 2) / _core.stretch(self.totals[None]) ** 2 * self.H
         return np.asarray((runs * self.scatter + _FEW * independent) / (runs + _FEW))
 
     @property

@@ -11,7 +11,6 @@ from ..motions import exp_twist
 
 LARGEST_TURN = 0.3   # rad, of a step
 _NO_INFORMATION = 1e-13  # of the best known direction's
-_LEAST_BEND = 0.6  # of the weights: a step is never so long that it ends as far beyond the end
 
 
 def take_steps(
@@ -37,9 +36,3 @@ def minimisers(H: Floats, g: Floats, basis: Floats) -> Floats:
     undo = np.linalg.pinv(size[:, :, None] * within * size[:, None], rcond=_NO_INFORMATION, hermitian=True)
     toward = size * np.einsum("bnm,bn->bm", basis, g)
     return np.asarray(-np.einsum("bnm,bm->bn", basis, size * np.einsum("bmk,bk->bm", undo, toward)))
-
-
-def stretch_of(totals: Floats) -> Floats:
-    """By how much to lengthen reweighted steps (B,): the loss bends less than its weights say (Huber, Robust
-    Statistics, 7.8), and the steps come out short by about a third."""
-    return np.asarray(1 / np.clip(totals[:, 2] / np.maximum(totals[:, 0], 1e-300), _LEAST_BEND, 1.0))

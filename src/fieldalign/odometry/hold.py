@@ -7,11 +7,9 @@ from functools import cached_property
 
 import numpy as np
 
-from ..alignment.steps import stretch_of
 from ..fields.protocol import Floats
 from ..verdict import Certainty, split
-from .local_map import LocalMap
-from .track import Matched, certainty_sums
+from .track import Matched
 
 MIN_HOLD = 1e-3  # of the best held direction's: less is what noise gives
 _MODESTY = 1.0   # on the variance
@@ -48,9 +46,9 @@ class Hold:
 
     @property
     def held(self) -> Floats:
-        """Columns (6, m): the twists that are held."""
+        """(6, 6), its columns are the twists that are held, or zero."""
         values, vectors = self._parts
-        return vectors[:, values >= MIN_HOLD * max(values[-1], 1e-300)] * self._lever
+        return np.ascontiguousarray(vectors * (values >= MIN_HOLD * max(values[-1], 1e-300)) * self._lever)
 
     def certainty(self) -> Certainty:
         """The covariance on what is held, and what is open."""
@@ -59,10 +57,9 @@ class Hold:
         )
 
 
-def hold_of(local: LocalMap, found: Matched) -> Hold:
+def hold_of(found: Matched) -> Hold:
     """What holds a scan where it was found."""
-    hold, scatter = certainty_sums(local.fine, found, local.voxel)
-    turn, shift = (float(np.trace(found.H[part, part])) for part in (slice(3), slice(3, 6)))
+    H = found.H.ravel()[::7]
+    turn, shift = float(H[:3].sum()), float(H[3:].sum())
     length = np.sqrt(turn / shift) if turn > 0 and shift > 0 else 1.0
-    curvature = found.H / stretch_of(found.totals[None])
-    return Hold(hold, scatter, curvature, float(length), found.origin + found.motion[:3, 3])
+    return Hold(found.hold, found.scatter, found.H / found.stretch, float(length), found.pose[:3, 3])

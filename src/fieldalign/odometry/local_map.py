@@ -22,10 +22,11 @@ class LocalMap:
         self.coarse = _core.VoxelMap(COARSER * measure.voxel)
         self._added = 0
 
-    def add(self, scan: Rows, pose: Floats) -> None:
-        """Points (M, 4), seen from a pose (4, 4); what lies beyond the reach is left behind now and then."""
-        self.fine.add(scan, pose, _MOST)
-        self.coarse.add(_core.thin_again(scan, self.voxel), pose, _MOST)
+    def add(self, points: Rows, sparse: Rows, pose: Floats) -> None:
+        """Points (M, 4) and fewer (K, 4) for the coarse map, seen from a pose (4, 4); what lies beyond the reach is left
+        behind now and then."""
+        self.fine.add(points, pose, _MOST)
+        self.coarse.add(sparse, pose, _MOST)
         self._added += 1
         if self._added % _SWEPT == 0:
             for voxels in (self.fine, self.coarse):

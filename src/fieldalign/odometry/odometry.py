@@ -73,7 +73,7 @@ class Odometry:
         clock.lap("align")
         if placed.reason.is_on_map:
             tracker.motion.follow(placed.pose, guess, elapsed)
-            tracker.map.add(scan.at_once(tracker.motion.velocity), placed.pose)  # and the target's field has grown
+            tracker.map.add(*scan.at_once(tracker.motion.velocity), placed.pose)  # and the target's field has grown
         else:
             tracker.motion.coast(guess)
         clock.lap("map")
@@ -93,7 +93,7 @@ class Odometry:
             pose, now = pose @ exp_twist(ahead * self._tracker.motion.velocity), now + ahead
         found = placed.found
         self.last = OdometryResult(
-            pose, now, placed.reason, 0 if found is None else len(found.pseudo), 0.0 if found is None else found.agreement,
+            pose, now, placed.reason, 0 if found is None else found.points, 0.0 if found is None else found.agreement,
             0 if found is None else found.iterations, clock.laps, placed.hold, placed.prediction,
         )
         self.stamps.append(now)

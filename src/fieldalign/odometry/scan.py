@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -50,9 +50,11 @@ class Measure:
 
 @dataclass(frozen=True, eq=False)
 class Scan:
-    """points: (M, 4) for the map. pseudo: (L, 4), on the scan's surface: their own distance is zero by construction."""
+    """points: (M, 4) for the fine map. sparse: (K, 4) of them, for the coarse one. pseudo: (L, 4) of these, on the
+    scan's surface: their own distance is zero by construction."""
 
     points: Rows
+    sparse: Rows
     pseudo: Rows
     is_timed: bool
 
@@ -63,11 +65,14 @@ class Scan:
 
     def all_at_once(self) -> Scan:
         """The same as if the times were not known."""
-        return Scan(self.points, self.pseudo, False)
+        return replace(self, is_timed=False)
 
-    def at_once(self, velocity: Floats) -> Rows:
-        """The map's points (M, 4) as seen in the middle of the sweep, the sensor moving at a twist (6,) a second."""
-        return _core.deskew(self.points, velocity) if self.is_timed else self.points
+    def at_once(self, velocity: Floats) -> tuple[Rows, Rows]:
+        """The points for the fine and the coarse map as seen in the middle of the sweep, the sensor moving at a twist
+        (6,) a second."""
+        if not self.is_timed:
+            return self.points, self.sparse
+        return _core.deskew(self.points, velocity), _core.deskew(self.sparse, velocity)
 
 
 def sweep_of(cloud: PointCloud | ArrayLike, times: ArrayLike | None, stamp: float | None) -> Sweep:
@@ -113,8 +118,7 @@ def thin_scan(sweep: Sweep, measure: Measure, settings: OdometrySettings, deskew
         sweep.points, sweep.times if deskew else None, sweep.middle or 0.0, stride, _THINNING * measure.voxel,
         _NEAR * measure.voxel, measure.range,
     )
-    pseudo = _core.thin_again(kept, measure.voxel)
+    sparse = _core.thin_again(kept, measure.voxel)
     wanted = settings.pseudo_points
-    if len(pseudo) > wanted:
-        pseudo = pseudo[np.arange(wanted) * len(pseudo) // wanted]
-    return Scan(kept, pseudo, deskew and sweep.times is not None)
+    pseudo = sparse[np.arange(wanted) * len(sparse) // wanted] if len(sparse) > wanted else sparse
+    return Scan(kept, sparse, pseudo, deskew and sweep.times is not None)

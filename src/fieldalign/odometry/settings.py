@@ -21,7 +21,7 @@ class OdometrySettings:
 
     voxel: float | None = None
     pseudo_points: int = 1500
-    points: int = 30_000
+    points: int = 25_000
 
     def __post_init__(self) -> None:
         if self.voxel is not None:

@@ -1,56 +1,57 @@
 """A scan is laid on the map: the paper's Gauss-Newton on pseudo points of the scan's own surface.
 
-Their own distance is zero by construction, so the residual (eq. 11) is the signed distance to the map's plane alone;
-weights and scale stand in cpp/tracking.hpp, the step's formulas in cpp/linearise.hpp.
+Their own distance is zero by construction, so the residual (eq. 11) is the signed distance to the map's plane alone. The
+schedule is told here; the loop itself, weights and scale stand in cpp/tracking.hpp, the step's formulas in
+cpp/linearise.hpp. In Python, the loop took a quarter of the time of a scan.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import _core
-from ..alignment import Step, descend
-from ..alignment.steps import LARGEST_TURN, minimisers, stretch_of, take_steps
+from ..alignment.steps import LARGEST_TURN
 from ..fields.protocol import Floats
-from ..motions import exp_twist
 from .local_map import COARSER, FEWEST, LocalMap
 from .motion import SteadyMotion
-from .scan import Rows, Scan
+from .scan import Scan
 
-_THICKNESS = 0.05   # voxels: no plane is taken for thinner
-_FLATNESS = 0.2     # of the variance along the shorter axis: what is thicker is no plane
-_DEVIATIONS = 3.0   # of residuals: one as large has a quarter of the weight
-_LEAST_GATE = 0.3   # voxels
-_STILL = 0.003      # voxels, and of a turn's effect at the map's rim: steps no longer are the last
-_RIM = 50           # voxels
-_STEPS_COARSE, _STEPS = 30, 15
+_STEPS, _STEPS_COARSE = 15, 30  # at most
 _FREE = 5           # steps, in which pseudo points find their planes anew; then in every third
+_DEVIATIONS = 3.0   # of residuals: one as large has a quarter of the weight
+_THICKNESS = 0.05   # voxels: no plane is taken for thinner, and no scale for finer
+_FLATNESS = 0.2     # of the variance along the shorter axis: what is thicker is no plane
+_FIRST_SCALE = 0.33  # of how far predictions are off, in the first step: what is off tells where to go
+_GATE = 3.0         # of how far predictions are off: beyond, a pseudo point has no partner
+_LEAST_GATE = 0.3   # voxels
+_STILL = 0.003      # voxels: steps no longer are the last
+_RIM = 50           # voxels: at that range, turns no longer
 
 
 @dataclass(frozen=True, eq=False)
 class Matched:
-    """Where a scan came to lie: a motion (4, 4) about `origin` (3,), the pseudo points as deskewed there, their cells,
-    and the last step's sums.
+    """Where a scan came to lie: a motion (4, 4) about `origin` (3,), and the sums of the last step there.
 
-    met: pseudo points that have a plane. on: of these, those that lie on it.
+    H, hold, scatter: (6, 6), as in cpp/linearise.hpp; stretch: by how much a step is lengthened. points: how many pseudo
+    points were aligned; met: that have a plane; on: of these, that lie on it.
     """
 
     motion: Floats
     origin: Floats
-    pseudo: Rows
-    cells: NDArray[np.int32]
     H: Floats
-    totals: Floats
+    hold: Floats
+    scatter: Floats
+    stretch: float
     scale: float
+    points: int
     met: int
     on: int
     iterations: int
 
-    @property
+    @cached_property
     def pose(self) -> Floats:
         """world_from_sensor (4, 4)."""
         pose = self.motion.copy()
@@ -66,86 +67,37 @@ class Matched:
         return self.on / self.met if self.met else 0.0
 
 
-class TrackStage:
-    """One map, one pose: pseudo points (L, 4) about `origin` (3,) against its planes."""
-
-    def __init__(
-        self, voxels: _core.VoxelMap, pseudo: Rows, origin: Floats, voxel: float, spread: float, iterations: int,
-        is_coarse: bool, deskewed: Callable[[Floats], Rows] | None, held: Floats | None,
-    ) -> None:
-        """spread: how far off the guess may be (a length). deskewed: the pseudo points for a pose (4, 4) about origin.
-        held: columns (6, m), the twists that the map holds; None: all."""
-        self.voxels, self.pseudo, self.origin, self.deskewed, self.held = voxels, pseudo, origin, deskewed, held
-        self.iterations, self.is_coarse, self.voxel = iterations, is_coarse, voxel
-        self.gate = max(3 * spread, _LEAST_GATE * voxel)
-        # At first the guess is off, and what is off tells where to go; later it is what moved, and is to be left out.
-        self.least_scale = max(spread / 3, _THICKNESS * voxel)
-        self.taken = 0
-
-    def step(self, poses: Floats) -> tuple[Floats, Step]:
-        """A Gauss-Newton step (eq. 14 to 16)."""
-        (G,) = poses
-        if self.deskewed is not None and self.taken <= _FREE:
-            self.pseudo = self.deskewed(G)
-        if self.taken < _FREE or self.taken % 3 == 0:
-            self.cells = self.voxels.match(self.pseudo, G, self.origin, FEWEST, self.is_coarse)
-        (H, g, totals), self.scale, self.met, self.on = self.voxels.sums(
-            self.pseudo, self.cells, G, self.origin, _DEVIATIONS, self.least_scale, self.gate,
-            _THICKNESS * self.voxel, _FLATNESS, self.is_coarse,
-        )
-        self.H, self.totals = H[0], totals[0]
-        self.least_scale = _THICKNESS * self.voxel
-        self.taken += 1
-        if self.held is None:
-            twists, poses = take_steps(poses, H, g, stretch_of(totals), None)
-        else:
-            twists = minimisers(H, g, self.held[None])
-            twists *= min(1.0, LARGEST_TURN / max(float(np.linalg.norm(twists[0, :3])), LARGEST_TURN))
-            poses = (exp_twist(twists[0]) @ G)[None]
-        return poses, Step(twists[0], self.scale, self.met)
-
-    def is_still(self, step: Step) -> bool:
-        """Whether the step moved the scan by next to nothing."""
-        w, v = step.increment[:3], step.increment[3:]
-        return bool(max(w @ w * _RIM**2 * self.voxel**2, v @ v) < (_STILL * self.voxel) ** 2)
-
-    def run(self, G: Floats) -> Matched:
-        """The motion (4, 4) about the origin after as many steps as it takes."""
-        (found,), steps = descend(self, G[None])
-        return Matched(
-            found, self.origin, self.pseudo, self.cells, self.H, self.totals, self.scale, self.met, self.on, len(steps)
-        )
-
-
-def certainty_sums(voxels: _core.VoxelMap, found: Matched, voxel: float) -> tuple[Floats, Floats]:
-    """What holds a scan where it was found (6, 6), and the scatter (6, 6) of the gradient there."""
-    return voxels.certainty(
-        found.pseudo, found.cells, found.motion, found.origin, found.scale, _LEAST_GATE * voxel, _THICKNESS * voxel,
-        _FLATNESS,
-    )
-
-
 def track(
     local: LocalMap, scan: Scan, guess: Floats, motion: SteadyMotion, seconds: float, is_rough: bool,
     held: Floats | None = None,
 ) -> Matched:
     """Where a scan lies on the map, from a guess (4, 4); a rough one is brought nearer on the coarse map first.
 
-    motion: that led here in so many seconds. held: columns (6, m), the twists that may be told from the scan.
+    motion: that led here in so many seconds. held: (6, 6), its columns are the twists that may be told from the scan.
     """
-    origin, G = guess[:3, 3].copy(), guess.copy()
-    G[:3, 3] = 0
-
-    def deskewed(at: Floats) -> Rows:
-        pose = at.copy()
-        pose[:3, 3] += origin
-        return _core.deskew(scan.pseudo, motion.between(pose, seconds))
-
-    carried = deskewed if scan.is_timed else None
+    origin = guess[:3, 3].copy()
+    start, last = _about(origin, guess), _about(origin, motion.pose) if scan.is_timed else None
     if is_rough:
-        coarse = TrackStage(
-            local.coarse, scan.pseudo, origin, COARSER * local.voxel, motion.spread, _STEPS_COARSE, True, carried, held
-        )
-        G = coarse.run(G).motion
-    fine = TrackStage(local.fine, scan.pseudo, origin, local.voxel, motion.spread, _STEPS, False, carried, held)
-    return fine.run(G)
+        settings = _settings(COARSER * local.voxel, motion.spread, _STEPS_COARSE)
+        start = local.coarse.track(scan.pseudo, start, origin, last, seconds, held, True, settings)["motion"]
+    settings = _settings(local.voxel, motion.spread, _STEPS)
+    found = local.fine.track(scan.pseudo, start, origin, last, seconds, held, False, settings)
+    return Matched(origin=origin, **found)
+
+
+def _about(origin: Floats, pose: Floats) -> Floats:
+    """A pose (4, 4) as seen from a place (3,), in the world's axes."""
+    moved = pose.copy()
+    moved[:3, 3] -= origin
+    return moved
+
+
+def _settings(voxel: float, spread: float, steps: int) -> dict[str, float]:
+    """The schedule on a map of such voxels, where guesses are so far off (lengths)."""
+    thickness, gate = _THICKNESS * voxel, max(_GATE * spread, _LEAST_GATE * voxel)
+    return {
+        "steps": steps, "free_steps": _FREE, "fewest": FEWEST, "deviations": _DEVIATIONS, "thickness": thickness,
+        "least_scale": thickness, "first_scale": _FIRST_SCALE * spread, "flatness": _FLATNESS, "gate": gate,
+        "certain_gate": _LEAST_GATE * voxel, "still_shift": _STILL * voxel, "still_turn": _STILL / _RIM,
+        "largest_turn": LARGEST_TURN,
+    }

@@ -60,12 +60,12 @@ class Tracker:
             self._first, self._usual = scan, len(scan.points)
             return Placed(guess, Tracking.FIRST)
         found = self._laid(scan, guess, seconds, event)
-        hold = hold_of(self.map, found)
+        hold = hold_of(found)
         if not hold.is_whole or self._held is not None:  # again, with what is held now
             self._held = None if hold.is_whole else hold.held
             found = self._laid(scan, guess, seconds, event)
-            hold = hold_of(self.map, found)
-        if found.agreement < _LEAST_AGREEMENT or found.met < _LEAST_MET * len(found.pseudo):
+            hold = hold_of(found)
+        if found.agreement < _LEAST_AGREEMENT or found.met < _LEAST_MET * found.points:
             return self._unplaced(guess, Tracking.LOST, found)
         self._is_adrift = False
         self._blind = np.zeros((6, 6)) if hold.is_whole else self._blind + self.motion.covariance
@@ -91,7 +91,7 @@ class Tracker:
         assert self._first is not None
         found = track(self.map, scan.all_at_once(), guess, self.motion, seconds, True)
         self.map = LocalMap(self.measure)
-        self.map.add(self._first.at_once(self.motion.between(found.pose, seconds)), self.motion.pose)
+        self.map.add(*self._first.at_once(self.motion.between(found.pose, seconds)), self.motion.pose)
         return track(self.map, scan, found.pose, self.motion, seconds, False)
 
     def _is_off(self, pose: Floats, guess: Floats) -> bool:
