@@ -1,5 +1,6 @@
 // What Python sees of odometry: thinned scans, the map of voxels, and the sums of a scan against it.
 #include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
 
 #include "step_arrays.hpp"
 #include "tracking.hpp"
@@ -52,11 +53,15 @@ Array<float> thinned(Points<Real> points, std::optional<Values> times, double mo
   return scan_array(std::move(scan));
 }
 
-Array<float> thinned_again(Scan scan, double voxel) {
+// The first point in each voxel, and `count` of these, evenly taken.
+auto thinned_twice(Scan scan, double voxel, std::size_t count) {
   if (!(voxel > 0)) throw std::invalid_argument("voxel must be positive");
   const auto points = scan_of(scan);
-  return scan_array(thin_scan(points.size(), 1, static_cast<float>(voxel), 0, std::numeric_limits<float>::infinity(),
-                              [&](std::size_t i) { return points[i]; }));
+  std::vector<ScanPoint> sparse = thin_scan(points.size(), 1, static_cast<float>(voxel), 0,
+                                            std::numeric_limits<float>::infinity(), [&](std::size_t i) { return points[i]; });
+  std::vector<ScanPoint> few(std::min(sparse.size(), count));
+  for (std::size_t i = 0; i < few.size(); ++i) few[i] = sparse[i * sparse.size() / few.size()];
+  return std::make_pair(scan_array(std::move(sparse)), scan_array(std::move(few)));
 }
 
 Array<float> deskewed(Scan scan, Values twist) {
@@ -118,6 +123,8 @@ nb::dict tracked(VoxelMap& map, Scan scan, Pose4 start, Values origin, std::opti
   result["H"] = symmetric_array(found.sums.step.H);
   result["stretch"] = found.sums.step.stretch();
   result["hold"] = array_of(known.hold);
+  result["lever"] = lever(found.sums.step.H);
+  result["least_hold"] = least_share(known.hold, lever(found.sums.step.H));
   result["scatter"] = array_of(known.scatter);
   return result;
 }
@@ -149,7 +156,7 @@ void bind_odometry(nb::module_& m) {
         "nearest"_a, "farthest"_a);
   m.def("thin_scan", &thinned<double>, "points"_a.noconvert(), "times"_a.none(), "moment"_a, "stride"_a, "voxel"_a,
         "nearest"_a, "farthest"_a);
-  m.def("thin_again", &thinned_again, "scan"_a, "voxel"_a);
+  m.def("thin_twice", &thinned_twice, "scan"_a, "voxel"_a, "count"_a);
   m.def("deskew", &deskewed, "scan"_a, "twist"_a);
   nb::class_<VoxelMap>(m, "VoxelMap", "A map that grows: voxels, in each of them the plane of its points.")
       .def("__init__", &construct_map, "voxel"_a)

@@ -184,8 +184,8 @@ def thin_scan(
     """Of every stride-th point (n, 3) the first in each voxel, between two ranges; times (n,) are counted from the
     moment. Points that are not finite are left out."""
 
-def thin_again(scan: Scan, voxel: float) -> Scan:
-    """The first point of a scan in each voxel."""
+def thin_twice(scan: Scan, voxel: float, count: int) -> tuple[Scan, Scan]:
+    """The first point of a scan in each voxel, and so many of these, evenly taken."""
 
 def deskew(scan: Scan, twist: Floats) -> Scan:
     """Each point as seen at the moment of the pose, by a sensor that moves at a steady twist (6,) a second."""
@@ -215,6 +215,7 @@ class VoxelMap:
         last: the pose (4, 4) about the origin, so many seconds ago: then the scan is deskewed. held: (6, 6), its
         columns are the twists that may be told from the scan. is_whole: voxels that are no planes hold, too, and planes
         along themselves. The answer holds motion (4, 4), H, hold and scatter (6, 6), stretch, scale, points, met (that
-        have a plane), on (that lie on it), and iterations."""
+        have a plane), on (that lie on it), iterations, the lever over which turns and shifts are of one size, and the
+        hold of the least held direction as a share of the best one's."""
     def planes(self, fewest: float) -> tuple[Floats, Floats, Floats]:
         """Means (n, 3), normals (n, 3) and numbers (n,) of points of the cells that hold so many."""

@@ -72,7 +72,7 @@ class Odometry:
         placed = tracker.place(scan, guess, elapsed, event)     # Gauss-Newton on the pseudo points (eq. 11 to 16)
         clock.lap("align")
         if placed.reason.is_on_map:
-            tracker.motion.follow(placed.pose, guess, elapsed)
+            tracker.motion.follow(placed.pose, elapsed)
             tracker.map.add(*scan.at_once(tracker.motion.velocity), placed.pose)  # and the target's field has grown
         else:
             tracker.motion.coast(guess)

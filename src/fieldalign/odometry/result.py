@@ -40,9 +40,9 @@ class OdometryResult:
         """Whether the scan itself tells the whole pose."""
         return self.reason.is_tracked
 
-    @cached_property
+    @property
     def _known(self) -> Certainty | None:
-        return None if self.hold is None else self.hold.certainty()
+        return None if self.hold is None else self.hold.certainty
 
     @cached_property
     def covariance(self) -> Floats:

@@ -118,7 +118,5 @@ def thin_scan(sweep: Sweep, measure: Measure, settings: OdometrySettings, deskew
         sweep.points, sweep.times if deskew else None, sweep.middle or 0.0, stride, _THINNING * measure.voxel,
         _NEAR * measure.voxel, measure.range,
     )
-    sparse = _core.thin_again(kept, measure.voxel)
-    wanted = settings.pseudo_points
-    pseudo = sparse[np.arange(wanted) * len(sparse) // wanted] if len(sparse) > wanted else sparse
+    sparse, pseudo = _core.thin_twice(kept, measure.voxel, settings.pseudo_points)
     return Scan(kept, sparse, pseudo, deskew and sweep.times is not None)

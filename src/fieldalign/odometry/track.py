@@ -35,8 +35,9 @@ _RIM = 50           # voxels: at that range, turns no longer
 class Matched:
     """Where a scan came to lie: a motion (4, 4) about `origin` (3,), and the sums of the last step there.
 
-    H, hold, scatter: (6, 6), as in cpp/linearise.hpp; stretch: by how much a step is lengthened. points: how many pseudo
-    points were aligned; met: that have a plane; on: of these, that lie on it.
+    H, hold, scatter: (6, 6), as in cpp/linearise.hpp; stretch: by how much a step is lengthened. lever: the length over
+    which turns and shifts are of one size; least_hold: of the least held direction, a share of the best one's.
+    points: how many pseudo points were aligned; met: that have a plane; on: of these, that lie on it.
     """
 
     motion: Floats
@@ -45,6 +46,8 @@ class Matched:
     hold: Floats
     scatter: Floats
     stretch: float
+    lever: float
+    least_hold: float
     scale: float
     points: int
     met: int

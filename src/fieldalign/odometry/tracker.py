@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..fields.protocol import Floats
-from .hold import Hold, hold_of
+from .hold import Hold
 from .local_map import LocalMap
 from .motion import SteadyMotion
 from .reason import Tracking
@@ -16,7 +16,6 @@ from .track import Matched, track
 
 _LEARNING = 6           # scans, from the first: little is known of the motion yet
 _MISJUDGED = 0.3        # voxels: a prediction that was farther off may have led to a wrong place
-_NEARBY = 10            # voxels: at that range a turn counts, for this, by what it moves
 _LEAST_AGREEMENT = 0.3  # of the pseudo points on known surface; with less, a scan is lost
 _LEAST_MET = 0.1        # of all pseudo points
 _SPARSE = 0.3           # of the usual number of points
@@ -44,7 +43,7 @@ class Tracker:
     def __init__(self, measure: Measure) -> None:
         self.measure = measure
         self.map = LocalMap(measure)
-        self.motion = SteadyMotion(measure.voxel, measure.range)
+        self.motion = SteadyMotion(measure.voxel)
         self._held: Floats | None = None  # the twists that the last scan's surfaces held; None: all
         self._blind: Floats = np.zeros((6, 6))
         self._first: Scan | None = None
@@ -60,16 +59,16 @@ class Tracker:
             self._first, self._usual = scan, len(scan.points)
             return Placed(guess, Tracking.FIRST)
         found = self._laid(scan, guess, seconds, event)
-        hold = hold_of(found)
+        hold = Hold(found)
         if not hold.is_whole or self._held is not None:  # again, with what is held now
             self._held = None if hold.is_whole else hold.held
             found = self._laid(scan, guess, seconds, event)
-            hold = hold_of(found)
+            hold = Hold(found)
         if found.agreement < _LEAST_AGREEMENT or found.met < _LEAST_MET * found.points:
             return self._unplaced(guess, Tracking.LOST, found)
         self._is_adrift = False
         self._blind = np.zeros((6, 6)) if hold.is_whole else self._blind + self.motion.covariance
-        reason = self._judged(scan, found, hold, event)
+        reason = self._judged(scan, found, hold, event, seconds)
         self._usual += _EAGER * (len(scan.points) - self._usual)
         return Placed(found.pose, reason, found, hold, self._blind)
 
@@ -82,7 +81,7 @@ class Tracker:
         if event is not Tracking.TRACKED or self._is_adrift:
             guesses += [self.motion.pose]
         tried = [track(self.map, scan, start, self.motion, seconds, is_rough, self._held) for start in guesses]
-        if not is_rough and self._is_off(tried[0].pose, guess):
+        if not is_rough and self.motion.surprise(tried[0].pose, seconds) > _MISJUDGED * self.measure.voxel:
             tried.append(track(self.map, scan, guess, self.motion, seconds, True, self._held))
         return max(tried, key=lambda one: one.on)
 
@@ -94,23 +93,17 @@ class Tracker:
         self.map.add(*self._first.at_once(self.motion.between(found.pose, seconds)), self.motion.pose)
         return track(self.map, scan, found.pose, self.motion, seconds, False)
 
-    def _is_off(self, pose: Floats, guess: Floats) -> bool:
-        turn, shift = self.motion.off(pose, guess)
-        return turn * _NEARBY * self.measure.voxel + shift > _MISJUDGED * self.measure.voxel
-
     def _unplaced(self, guess: Floats, reason: Tracking, found: Matched | None = None) -> Placed:
         self._is_adrift = True
         self._blind = self._blind + self.motion.covariance
         return Placed(guess, reason, found, None, self._blind)
 
-    def _judged(self, scan: Scan, found: Matched, hold: Hold, event: Tracking) -> Tracking:
+    def _judged(self, scan: Scan, found: Matched, hold: Hold, event: Tracking, seconds: float) -> Tracking:
         if not hold.is_whole:
             return Tracking.DEGENERATE
         if event is not Tracking.TRACKED:
             return event
         if len(scan.points) < _SPARSE * self._usual:
             return Tracking.SPARSE
-        turn, shift = self.motion.off(found.pose, self.motion.pose)
-        if turn * _NEARBY * self.measure.voxel + shift < _STILL * self.measure.voxel:
-            return Tracking.STANDSTILL
-        return Tracking.TRACKED
+        moved = self.motion.between(found.pose, seconds) * seconds
+        return Tracking.STANDSTILL if self.motion.size(moved) < _STILL * self.measure.voxel else Tracking.TRACKED
