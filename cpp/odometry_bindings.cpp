@@ -94,7 +94,7 @@ Array<double> symmetric_array(Square<6> H) {
 nb::dict tracked(VoxelMap& map, Scan scan, Pose4 start, Values origin, std::optional<Pose4> last, double seconds,
                  std::optional<Pose6> held, bool is_whole, nb::dict settings) {
   const Numbers s{settings};
-  TrackLoss loss{s("deviations"), s("least_scale"), s("gate"), s("thickness"), s("flatness"), is_whole};
+  TrackLoss loss{s("deviations"), s("least_scale"), s("gate"), s("thickness"), s("flatness"), s("width"), is_whole};
   const TrackSchedule schedule{s.whole("steps"), s.whole("free_steps"), s("fewest"), s("first_scale"),
                                s("still_shift"), s("still_turn"), s("largest_turn")};
   const Vec3 about = vector_of(origin);
@@ -129,9 +129,9 @@ nb::dict tracked(VoxelMap& map, Scan scan, Pose4 start, Values origin, std::opti
   return result;
 }
 
-// Means (n, 3), normals (n, 3) and numbers of points (n,) of the cells that hold so many.
+// Means (n, 3), normals (n, 3), numbers of points (n,) and the two lesser variances (n, 2) of the cells that hold so many.
 nb::tuple planes(VoxelMap& map, double fewest) {
-  std::vector<double> means, normals, counts;
+  std::vector<double> means, normals, counts, variances;
   for (std::size_t i = 0; i < map.size(); ++i) {
     const auto cell = static_cast<std::int32_t>(i);
     if (map.count(cell) < fewest) continue;
@@ -139,9 +139,11 @@ nb::tuple planes(VoxelMap& map, double fewest) {
     means.insert(means.end(), {plane.mean.x, plane.mean.y, plane.mean.z});
     normals.insert(normals.end(), {plane.normal.x, plane.normal.y, plane.normal.z});
     counts.push_back(map.count(cell));
+    variances.insert(variances.end(), {plane.least, plane.middle});
   }
   const std::size_t n = counts.size();
-  return nb::make_tuple(array(std::move(means), {n, 3}), array(std::move(normals), {n, 3}), array(std::move(counts), {n}));
+  return nb::make_tuple(array(std::move(means), {n, 3}), array(std::move(normals), {n, 3}), array(std::move(counts), {n}),
+                        array(std::move(variances), {n, 2}));
 }
 
 void construct_map(VoxelMap* self, double voxel) {

@@ -12,7 +12,8 @@ struct TrackLoss {
   double least_scale;  // the scale is no finer than that (a length)
   double gate;         // beyond, a pseudo point has no partner (a length)
   double thickness;    // of a plane, at least (a length)
-  double flatness;     // a plane has less than this share of its variance along the shorter axis across
+  double flatness;     // a plane has less than this share of its variance along the shorter axis across,
+  double width;        // and along that a deviation of at least this (a length): a beam's trace is a line, no plane
   bool is_whole;       // whether voxels that are no planes hold, too, and planes along themselves
 };
 
@@ -29,7 +30,7 @@ inline double spread_across(double variance, const TrackLoss& loss) {
 }
 
 inline bool is_plane(const MapPlane& plane, const TrackLoss& loss) {
-  return loss.is_whole || plane.least < loss.flatness * plane.middle;
+  return loss.is_whole || (plane.least < loss.flatness * plane.middle && plane.middle > loss.width * loss.width);
 }
 
 // A pseudo point that has a plane: where it is about `origin`, in the axes of the world, and its residual.

@@ -34,5 +34,5 @@ class LocalMap:
 
     def cloud(self) -> PointCloud:
         """One point with its normal for each voxel that has a plane, and how many points it stands for."""
-        means, normals, counts = self.fine.planes(FEWEST)
+        means, normals, counts, _ = self.fine.planes(FEWEST)
         return PointCloud(means, normals=normals, attributes={"count": counts})

@@ -24,6 +24,7 @@ _FREE = 5           # steps, in which pseudo points find their planes anew; then
 _DEVIATIONS = 3.0   # of residuals: one as large has a quarter of the weight
 _THICKNESS = 0.05   # voxels: no plane is taken for thinner, and no scale for finer
 _FLATNESS = 0.2     # of the variance along the shorter axis: what is thicker is no plane
+_WIDTH = 0.15       # voxels, of the deviation along it: what is narrower is the trace of a beam, no plane
 _FIRST_SCALE = 0.33  # of how far predictions are off, in the first step: what is off tells where to go
 _GATE = 3.0         # of how far predictions are off: beyond, a pseudo point has no partner
 _LEAST_GATE = 0.3   # voxels
@@ -100,7 +101,8 @@ def _settings(voxel: float, spread: float, steps: int) -> dict[str, float]:
     thickness, gate = _THICKNESS * voxel, max(_GATE * spread, _LEAST_GATE * voxel)
     return {
         "steps": steps, "free_steps": _FREE, "fewest": FEWEST, "deviations": _DEVIATIONS, "thickness": thickness,
-        "least_scale": thickness, "first_scale": _FIRST_SCALE * spread, "flatness": _FLATNESS, "gate": gate,
+        "least_scale": thickness, "first_scale": _FIRST_SCALE * spread, "flatness": _FLATNESS, "width": _WIDTH * voxel,
+        "gate": gate,
         "certain_gate": _LEAST_GATE * voxel, "still_shift": _STILL * voxel, "still_turn": _STILL / _RIM,
         "largest_turn": LARGEST_TURN,
     }

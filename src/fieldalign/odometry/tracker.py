@@ -15,7 +15,7 @@ from .scan import Measure, Scan
 from .track import Matched, track
 
 _LEARNING = 6           # scans, from the first: little is known of the motion yet
-_MISJUDGED = 0.3        # voxels: a prediction that was farther off may have led to a wrong place
+_MISJUDGED, _UNUSUAL = 0.3, 2.0  # voxels, and usual errors: a prediction that was off by more than both may have misled
 _LEAST_AGREEMENT = 0.3  # of the pseudo points on known surface; with less, a scan is lost
 _LEAST_MET = 0.1        # of all pseudo points
 _SPARSE = 0.3           # of the usual number of points
@@ -81,7 +81,8 @@ class Tracker:
         if event is not Tracking.TRACKED or self._is_adrift:
             guesses += [self.motion.pose]
         tried = [track(self.map, scan, start, self.motion, seconds, is_rough, self._held) for start in guesses]
-        if not is_rough and self.motion.surprise(tried[0].pose, seconds) > _MISJUDGED * self.measure.voxel:
+        usual = max(_MISJUDGED * self.measure.voxel, _UNUSUAL * self.motion.spread)
+        if not is_rough and self.motion.surprise(tried[0].pose, seconds) > usual:
             tried.append(track(self.map, scan, guess, self.motion, seconds, True, self._held))
         return max(tried, key=lambda one: one.on)
 
