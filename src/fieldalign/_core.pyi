@@ -218,5 +218,5 @@ class VoxelMap:
         have a plane), on (that lie on it), iterations, the lever over which turns and shifts are of one size, and the
         hold of the least held direction as a share of the best one's."""
     def planes(self, fewest: float) -> tuple[Floats, Floats, Floats, Floats]:
-        """Means (n, 3), normals (n, 3), numbers of points (n,) and the two lesser variances (n, 2) of the cells that hold
-        so many."""
+        """Means (n, 3), normals (n, 3), numbers of points (n,) and the two lesser variances (n, 2) of the cells that
+        hold so many."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 from .. import _core
 from ..clouds.cloud import PointCloud
 from ..fields.protocol import Floats
-from .scan import Measure, Rows
+from .measure import FEWEST, Measure
+from .scan import Rows
 
 COARSER = 3.0  # times the voxel
-FEWEST = 5     # points of a plane
 _MOST = 100    # points of a voxel: then it stays as it is
 _SWEPT = 10    # scans from one sweeping to the next
 
@@ -23,8 +23,8 @@ class LocalMap:
         self._added = 0
 
     def add(self, points: Rows, sparse: Rows, pose: Floats) -> None:
-        """Points (M, 4) and fewer (K, 4) for the coarse map, seen from a pose (4, 4); what lies beyond the reach is left
-        behind now and then."""
+        """Points (M, 4) and fewer (K, 4) for the coarse map, seen from a pose (4, 4); what lies beyond the reach is
+        left behind now and then."""
         self.fine.add(points, pose, _MOST)
         self.coarse.add(sparse, pose, _MOST)
         self._added += 1

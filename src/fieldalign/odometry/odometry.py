@@ -10,10 +10,11 @@ from ..clouds.cloud import PointCloud
 from ..errors import ArgumentError
 from ..fields.protocol import Floats
 from ..motions import exp_twist
+from .measure import measure_of
 from .pace import Pace
 from .reason import Tracking
 from .result import OdometryResult
-from .scan import Sweep, measure_of, sweep_of, thin_scan
+from .scan import Sweep, sweep_of, thin_scan
 from .settings import OdometrySettings
 from .tracker import Placed, Tracker
 
@@ -66,6 +67,7 @@ class Odometry:
         tracker = self._tracker or self._begun(sweep)
         if tracker is None:
             return self._told(Placed(np.eye(4), Tracking.EMPTY), sweep, clock)
+        tracker.look_around(sweep)
         scan = thin_scan(sweep, tracker.measure, self.settings, self.deskew)
         clock.lap("thin")
         guess = tracker.motion.predicted(elapsed)               # constant velocity
@@ -81,7 +83,7 @@ class Odometry:
 
     def _begun(self, sweep: Sweep) -> Tracker | None:
         """The tracker, begun with the first scan that tells the lengths of the drive."""
-        measure = measure_of(sweep, self.settings.voxel)
+        measure = measure_of(sweep.points, self.settings.voxel)
         self._tracker = None if measure is None else Tracker(measure)
         return self._tracker
 

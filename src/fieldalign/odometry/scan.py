@@ -12,16 +12,12 @@ from .. import _core
 from ..clouds.cloud import PointCloud, as_points
 from ..errors import ArgumentError
 from ..fields.protocol import Floats
-from ..scale import scale_of
+from .measure import THINNING, Measure
 from .settings import OdometrySettings
 
 Rows = NDArray[np.float32]  # (., 4): a place in the sensor's frame, and seconds from the middle of the sweep
 
-_CELLS = 1500        # that a scan's surface fills at the map's voxel
-_THINNING = 0.4      # voxels: points for the map lie no closer
-_FEWEST = 50         # pseudo points: with fewer, a scan counts as empty
-_RANGES = 1000       # points that the range is read from
-_FAR = 1.5           # of the range of nearly all points: what lies farther is no surface that will be seen again
+FEWEST_PSEUDO = 50         # pseudo points: with fewer, a scan counts as empty
 _NEAR = 0.5          # voxels: what is nearer is the sensor itself, or a missing return written as zero
 
 
@@ -40,14 +36,6 @@ class Sweep:
     stamp: float | None
 
 
-@dataclass(frozen=True)
-class Measure:
-    """The lengths of a drive, read from its scans: the edge of a voxel, and the range beyond which nothing is used."""
-
-    voxel: float
-    range: float
-
-
 @dataclass(frozen=True, eq=False)
 class Scan:
     """points: (M, 4) for the fine map. sparse: (K, 4) of them, for the coarse one. pseudo: (L, 4) of these, on the
@@ -61,7 +49,7 @@ class Scan:
     @property
     def is_empty(self) -> bool:
         """Whether there is too little to be aligned."""
-        return len(self.pseudo) < _FEWEST
+        return len(self.pseudo) < FEWEST_PSEUDO
 
     def all_at_once(self) -> Scan:
         """The same as if the times were not known."""
@@ -94,28 +82,12 @@ def sweep_of(cloud: PointCloud | ArrayLike, times: ArrayLike | None, stamp: floa
     return Sweep(points, seconds, (first + last) / 2, span, stamp)
 
 
-def measure_of(sweep: Sweep, voxel: float | None) -> Measure | None:
-    """The lengths that a first scan tells; None where it has too few points to tell any."""
-    seen = sweep.points[np.isfinite(sweep.points).all(axis=1) & (sweep.points != 0).any(axis=1)]
-    if len(seen) < _FEWEST or not np.ptp(seen, axis=0).any():
-        return None
-    return Measure(voxel or scale_of(np.ascontiguousarray(seen), 1, _CELLS).voxel, range_of(sweep))
-
-
-def range_of(sweep: Sweep) -> float:
-    """The range (length) within which nearly all points lie, and half as much again; 0 where there are none."""
-    sample = np.asarray(sweep.points[:: max(1, len(sweep.points) // _RANGES)], float)
-    ranges = np.sqrt((sample**2).sum(axis=1))
-    ranges = ranges[np.isfinite(ranges) & (ranges > 0)]
-    return float(_FAR * np.quantile(ranges, 0.99)) if len(ranges) else 0.0
-
-
 def thin_scan(sweep: Sweep, measure: Measure, settings: OdometrySettings, deskew: bool) -> Scan:
     """Points for the map, one in 0.4 voxels, and of these pseudo points, one in a voxel."""
     # An odd stride meets every beam, where points come one beam after the other.
     stride = len(sweep.points) // settings.points | 1
     kept = _core.thin_scan(
-        sweep.points, sweep.times if deskew else None, sweep.middle or 0.0, stride, _THINNING * measure.voxel,
+        sweep.points, sweep.times if deskew else None, sweep.middle or 0.0, stride, THINNING * measure.voxel,
         _NEAR * measure.voxel, measure.range,
     )
     sparse, pseudo = _core.thin_twice(kept, measure.voxel, settings.pseudo_points)

@@ -1,7 +1,7 @@
 """A scan is laid on the map: the paper's Gauss-Newton on pseudo points of the scan's own surface.
 
-Their own distance is zero by construction, so the residual (eq. 11) is the signed distance to the map's plane alone. The
-schedule is told here; the loop itself, weights and scale stand in cpp/tracking.hpp, the step's formulas in
+Their own distance is zero by construction, so the residual (eq. 11) is the signed distance to the map's plane alone.
+The schedule is told here; the loop, weights and scale stand in cpp/tracking.hpp, the step's formulas in
 cpp/linearise.hpp. In Python, the loop took a quarter of the time of a scan.
 """
 
@@ -12,10 +12,10 @@ from functools import cached_property
 
 import numpy as np
 
-from .. import _core
 from ..alignment.steps import LARGEST_TURN
 from ..fields.protocol import Floats
-from .local_map import COARSER, FEWEST, LocalMap
+from .local_map import COARSER, LocalMap
+from .measure import FEWEST, FLATNESS, WIDTH
 from .motion import SteadyMotion
 from .scan import Scan
 
@@ -23,8 +23,6 @@ _STEPS, _STEPS_COARSE = 15, 30  # at most
 _FREE = 5           # steps, in which pseudo points find their planes anew; then in every third
 _DEVIATIONS = 3.0   # of residuals: one as large has a quarter of the weight
 _THICKNESS = 0.05   # voxels: no plane is taken for thinner, and no scale for finer
-_FLATNESS = 0.2     # of the variance along the shorter axis: what is thicker is no plane
-_WIDTH = 0.15       # voxels, of the deviation along it: what is narrower is the trace of a beam, no plane
 _FIRST_SCALE = 0.33  # of how far predictions are off, in the first step: what is off tells where to go
 _GATE = 3.0         # of how far predictions are off: beyond, a pseudo point has no partner
 _LEAST_GATE = 0.3   # voxels
@@ -101,7 +99,7 @@ def _settings(voxel: float, spread: float, steps: int) -> dict[str, float]:
     thickness, gate = _THICKNESS * voxel, max(_GATE * spread, _LEAST_GATE * voxel)
     return {
         "steps": steps, "free_steps": _FREE, "fewest": FEWEST, "deviations": _DEVIATIONS, "thickness": thickness,
-        "least_scale": thickness, "first_scale": _FIRST_SCALE * spread, "flatness": _FLATNESS, "width": _WIDTH * voxel,
+        "least_scale": thickness, "first_scale": _FIRST_SCALE * spread, "flatness": FLATNESS, "width": WIDTH * voxel,
         "gate": gate,
         "certain_gate": _LEAST_GATE * voxel, "still_shift": _STILL * voxel, "still_turn": _STILL / _RIM,
         "largest_turn": LARGEST_TURN,

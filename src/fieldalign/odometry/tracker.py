@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ..fields.protocol import Floats
 from .hold import Hold
 from .local_map import LocalMap
+from .measure import Measure, range_of
 from .motion import SteadyMotion
 from .reason import Tracking
-from .scan import Measure, Scan
+from .scan import Scan, Sweep
 from .track import Matched, track
 
 _LEARNING = 6           # scans, from the first: little is known of the motion yet
@@ -20,6 +21,7 @@ _LEAST_AGREEMENT = 0.3  # of the pseudo points on known surface; with less, a sc
 _LEAST_MET = 0.1        # of all pseudo points
 _SPARSE = 0.3           # of the usual number of points
 _EAGER = 0.1            # of the way that the usual number goes to the latest
+_LOOKED = 10            # scans from one look at the range to the next
 _STILL = 0.01           # voxels: a sensor that moves by less stands still
 
 
@@ -49,6 +51,12 @@ class Tracker:
         self._first: Scan | None = None
         self._is_adrift = False
         self._scans, self._usual = 0, 0.0
+
+    def look_around(self, sweep: Sweep) -> None:
+        """Now and then the range grows with what is seen."""
+        if self._scans % _LOOKED == 0:
+            self.measure = replace(self.measure, range=max(self.measure.range, range_of(sweep.points)))
+            self.map.reach = self.measure.range
 
     def place(self, scan: Scan, guess: Floats, seconds: float, event: Tracking) -> Placed:
         """Where a scan lies, so many seconds after the last, near a guess (4, 4)."""
