@@ -53,14 +53,15 @@ Array<float> thinned(Points<Real> points, std::optional<Values> times, double mo
   return scan_array(std::move(scan));
 }
 
-// The first point in each voxel, and `count` of these, evenly taken.
+// The first point in each voxel, and `count` of these, evenly taken; where these are too few, of all.
 auto thinned_twice(Scan scan, double voxel, std::size_t count) {
   if (!(voxel > 0)) throw std::invalid_argument("voxel must be positive");
   const auto points = scan_of(scan);
   std::vector<ScanPoint> sparse = thin_scan(points.size(), 1, static_cast<float>(voxel), 0,
                                             std::numeric_limits<float>::infinity(), [&](std::size_t i) { return points[i]; });
-  std::vector<ScanPoint> few(std::min(sparse.size(), count));
-  for (std::size_t i = 0; i < few.size(); ++i) few[i] = sparse[i * sparse.size() / few.size()];
+  const std::span<const ScanPoint> from = sparse.size() < count ? points : sparse;
+  std::vector<ScanPoint> few(std::min(from.size(), count));
+  for (std::size_t i = 0; i < few.size(); ++i) few[i] = from[i * from.size() / few.size()];
   return std::make_pair(scan_array(std::move(sparse)), scan_array(std::move(few)));
 }
 

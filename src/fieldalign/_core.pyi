@@ -185,7 +185,8 @@ def thin_scan(
     moment. Points that are not finite are left out."""
 
 def thin_twice(scan: Scan, voxel: float, count: int) -> tuple[Scan, Scan]:
-    """The first point of a scan in each voxel, and so many of these, evenly taken."""
+    """The first point of a scan in each voxel, and so many of these, evenly taken; of all, where
+    these are too few."""
 
 def deskew(scan: Scan, twist: Floats) -> Scan:
     """Each point as seen at the moment of the pose, by a sensor that moves at a steady twist (6,) a second."""
