@@ -12,7 +12,7 @@ from ..verdict import Certainty, split
 from .track import Matched
 
 MIN_HOLD = 1e-3  # of the best held direction's: less is what noise gives
-_MODESTY = 1.0   # on the variance
+_MODESTY = 4.0   # on the variance: what runs of residuals do not show; errors of beams, and of the map itself
 
 
 @dataclass(frozen=True, eq=False)

@@ -52,13 +52,12 @@ class SteadyMotion:
         """(6, 6) of one prediction, as a twist (w, v) about the sensor."""
         return np.asarray(self.spread**2 / 3 * np.diag([1 / self._arm**2] * 3 + [1.0] * 3))
 
-    def follow(self, pose: Floats, seconds: float) -> None:
-        """The next pose (4, 4) is known."""
-        velocity = self.between(pose, seconds)
-        self._seen += self._seen < _REMEMBERED
-        self._square += (self.size((velocity - self.velocity) * seconds) ** 2 - self._square) / self._seen
-        self.pose, self.velocity = pose, velocity
-
-    def coast(self, guess: Floats) -> None:
-        """Nothing is known of the next pose (4, 4) but the guess."""
-        self.pose = guess
+    def follow(self, pose: Floats, seconds: float | None) -> None:
+        """The next pose (4, 4), so many seconds after the last; None: it is but the prediction."""
+        if seconds is not None:
+            velocity = self.between(pose, seconds)
+            self._seen += self._seen < _REMEMBERED
+            off = self.size((velocity - self.velocity) * seconds)
+            self._square += (off**2 - self._square) / self._seen
+            self.velocity = velocity
+        self.pose = pose

@@ -66,25 +66,26 @@ class Odometry:
         elapsed, event = self._pace.advance(sweep.middle, sweep.span)
         tracker = self._tracker or self._begun(sweep)
         if tracker is None:
-            return self._told(Placed(np.eye(4), Tracking.EMPTY), sweep, clock)
+            return self._told(Placed(np.eye(4), elapsed, Tracking.EMPTY), sweep, clock)
         tracker.look_around(sweep)
         scan = thin_scan(sweep, tracker.measure, self.settings, self.deskew)
+        if tracker.is_worn(scan):
+            tracker = self._begun(sweep) or tracker
+            scan = thin_scan(sweep, tracker.measure, self.settings, self.deskew)
         clock.lap("thin")
-        guess = tracker.motion.predicted(elapsed)               # constant velocity
-        placed = tracker.place(scan, guess, elapsed, event)     # Gauss-Newton on the pseudo points (eq. 11 to 16)
+        placed = tracker.place(scan, elapsed, self._pace.interval, event)  # Gauss-Newton on pseudo points (eq. 11 to 16)
         clock.lap("align")
+        tracker.motion.follow(placed.pose, placed.seconds if placed.found else None)
         if placed.reason.is_on_map:
-            tracker.motion.follow(placed.pose, elapsed)
             tracker.map.add(*scan.at_once(tracker.motion.velocity), placed.pose)  # and the target's field has grown
-        else:
-            tracker.motion.coast(guess)
         clock.lap("map")
         return self._told(placed, sweep, clock)
 
     def _begun(self, sweep: Sweep) -> Tracker | None:
-        """The tracker, begun with the first scan that tells the lengths of the drive."""
+        """A tracker, begun with a scan that tells the lengths of the drive; it goes on from the one before."""
         measure = measure_of(sweep.points, self.settings.voxel)
-        self._tracker = None if measure is None else Tracker(measure)
+        if measure is not None:
+            self._tracker = Tracker(measure, self._tracker)
         return self._tracker
 
     def _told(self, placed: Placed, sweep: Sweep, clock: Clock) -> Floats:

@@ -14,6 +14,8 @@ class Tracking(Enum):
     SPARSE = "sparse"
     GAP = "gap"
     CLOCK_JUMPED = "clock_jumped"
+    DOUBTFUL = "doubtful"
+    RESTARTED = "restarted"
     DEGENERATE = "degenerate"
     LOST = "lost"
     EMPTY = "empty"
@@ -24,7 +26,7 @@ class Tracking(Enum):
     @property
     def is_tracked(self) -> bool:
         """Whether the scan itself tells the pose, all of it; otherwise (part of) it is the prediction's."""
-        return self.is_on_map and self is not Tracking.DEGENERATE
+        return self.is_on_map and self not in (Tracking.DEGENERATE, Tracking.RESTARTED)
 
     @property
     def is_on_map(self) -> bool:
@@ -39,6 +41,9 @@ _SENTENCES = {
     Tracking.SPARSE: "Tracked, though the scan has far fewer points than those before it.",
     Tracking.GAP: "Tracked after a gap: scans between the last one and this one are missing.",
     Tracking.CLOCK_JUMPED: "Tracked, though the clock jumped: the scan was taken to follow the last one as usual.",
+    Tracking.DOUBTFUL: "Doubtful: far less of the scan agrees with the map than of those before; it may lie elsewhere.",
+    Tracking.RESTARTED: "Begun anew: too many scans did not lie on the map, so a new one was begun where the sensor was "
+    "thought to be.",
     Tracking.DEGENERATE: "Degenerate: the scan may slide or turn on the map without a difference; that part of the "
     "motion is the prediction's.",
     Tracking.LOST: "Lost: the scan does not lie on the map near where it was expected; the pose is the prediction, "

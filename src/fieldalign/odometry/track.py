@@ -26,6 +26,7 @@ _THICKNESS = 0.05   # voxels: no plane is taken for thinner, and no scale for fi
 _FIRST_SCALE = 0.33  # of how far predictions are off, in the first step: what is off tells where to go
 _GATE = 3.0         # of how far predictions are off: beyond, a pseudo point has no partner
 _LEAST_GATE = 0.3   # voxels
+_KNOWN = 0.25       # of the pseudo points: where fewer are on known surface, the agreement of these tells little
 _STILL = 0.003      # voxels: steps no longer are the last
 _RIM = 50           # voxels: at that range, turns no longer
 
@@ -67,6 +68,11 @@ class Matched:
     def agreement(self) -> float:
         """Share of the pseudo points on known surface that lie on it."""
         return self.on / self.met if self.met else 0.0
+
+    @property
+    def score(self) -> float:
+        """The agreement, where enough is on known surface to say so."""
+        return self.on / max(self.met, _KNOWN * self.points, 1)
 
 
 def track(
