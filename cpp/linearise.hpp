@@ -101,11 +101,13 @@ struct CertaintySums {
   // differ by noise alone, does not hold a pose that slides on it.
   void add(Vec3 x, Vec3 own_normal, Vec3 mean, const Residual& found, double spread, const RobustLoss& loss) {
     const double w = weight_of(found, spread, loss) / (spread * spread);
-    const auto own = row_of<N>(x, own_normal), other = row_of<N>(mean, found.normal), row = row_of<N>(x, found.between);
-    for (int a = 0; a < N; ++a) {
-      run[a] += w * found.r * row[a];
+    const auto own = row_of<N>(x, own_normal), other = row_of<N>(mean, found.normal);
+    for (int a = 0; a < N; ++a)
       for (int b = 0; b < N; ++b) hold[a][b] += w / 2 * (own[a] * other[b] + other[a] * own[b]);
-    }
+    add_gradient(w * found.r, row_of<N>(x, found.between));
+  }
+  void add_gradient(double weighted, const std::array<double, N>& row) {
+    for (int a = 0; a < N; ++a) run[a] += weighted * row[a];
     if (++length == kRun) end_run();
   }
   void end_run() {

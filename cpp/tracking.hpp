@@ -21,7 +21,7 @@ struct TrackSums {
   StepSums<6> step;
   double scale = 0;
   int met = 0;  // pseudo points in a voxel with a plane
-  int on = 0;   // of these, within twice the thickness of it
+  int on = 0;   // of these, within four times the thickness of it
 };
 
 // How widely residuals across a plane of this variance scatter, as a multiple of the least.
@@ -81,7 +81,7 @@ inline TrackSums track_sums(VoxelMap& map, std::span<const ScanPoint> scan, std:
   met.reserve(scan.size()), sizes.reserve(scan.size());
   meet_planes(map, scan, cells, pose, origin, loss, [&](const Met& m) {
     ++sums.met;
-    sums.on += std::abs(m.r) < 2 * loss.thickness;
+    sums.on += std::abs(m.r) < 4 * loss.thickness;
     if (std::abs(m.r) > loss.gate) return;
     met.push_back(m);
     sizes.push_back(std::abs(m.r) / m.spread);
@@ -109,16 +109,17 @@ inline CertaintySums<6> certainty_sums(VoxelMap& map, std::span<const ScanPoint>
   meet_planes(map, scan, cells, pose, origin, loss, [&](const Met& m) {
     if (std::abs(m.r) > loss.gate) return;
     const Vec3 n = m.plane->normal;
-    const Residual found{m.r, 1, n, n};
-    known.add(m.x, n, m.x, found, m.spread, robust);
+    const double w = weight_of({m.r, 1, n, n}, m.spread, robust) / (m.spread * m.spread);
+    const auto row = row_of<6>(m.x, n);
+    known.add_gradient(w * m.r, row);
     const double tilt = m.plane->least / (m.plane->middle * m.count);  // variance of the normal, along an axis
-    const double noise = weight_of(found, m.spread, robust) / (m.spread * m.spread) * tilt;
-    for (const Vec3 axis : across(n)) {
-      const auto row = row_of<6>(m.x, axis);
-      for (int a = 0; a < 6; ++a)
-        for (int b = 0; b < 6; ++b) known.hold[a][b] -= noise * row[a] * row[b];
-    }
+    const auto [first, second] = across(n);
+    const auto one = row_of<6>(m.x, first), two = row_of<6>(m.x, second);
+    for (int a = 0; a < 6; ++a)
+      for (int b = a; b < 6; ++b) known.hold[a][b] += w * (row[a] * row[b] - tilt * (one[a] * one[b] + two[a] * two[b]));
   });
+  for (int a = 0; a < 6; ++a)
+    for (int b = 0; b < a; ++b) known.hold[a][b] = known.hold[b][a];
   known.end_run();
   return known;
 }

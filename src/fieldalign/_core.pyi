@@ -58,6 +58,9 @@ def exp_twist(twist: Floats) -> Floats:
 def log_motion(T: Floats) -> Floats:
     """The twist (w, v) (6,) that generates a motion (4, 4), turning by at most pi."""
 
+def relative_twist(A: Floats, B: Floats) -> Floats:
+    """The twist (6,) of A^-1 B, of motions (4, 4)."""
+
 def directions(value: Floats, gradient: Floats) -> Floats:
     """Unit vectors (n, 3) away from the feet; zero where there is no gradient."""
 

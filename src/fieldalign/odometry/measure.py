@@ -16,7 +16,8 @@ FLATNESS = 0.2     # of its variance along the shorter axis: what is thicker acr
 WIDTH = 0.15       # voxels, of its deviation along that axis: what is narrower is the trace of a beam, no plane
 THINNING = 0.4     # voxels: points for the map lie no closer
 _CELLS = 1500      # that a scan's surface fills
-_TRIED = 2.0 ** np.arange(-1, 1.1, 0.25)  # of the voxel that it does so with
+_TRIED = 2.0 ** np.arange(-1, 1.6, 0.25)  # of the voxel that it does so with
+_WIDER = 2         # steps of these, to the voxel whose planes tell the thickness
 _ENOUGH = 0.75     # of the largest share of planes: at smaller voxels, most hold the trace of a single beam
 _SMOOTH = 40.0     # voxels to the planes' thickness, at least: the noise of a beam tilts planes that are short
 _FEWEST_POINTS = 100
@@ -46,9 +47,9 @@ def natural_voxel(points: NDArray[Any]) -> float:
     of cells, where most of the planes show that ever do, and some multiple of these planes' thickness."""
     usual = scale_of(points, 1, _CELLS).voxel
     planes = [_planes(points, float(voxel)) for voxel in usual * _TRIED]
-    shares = np.array([share for share, _ in planes])
+    shares = np.array([share for share, _ in planes[:-_WIDER]])
     k = max(int(np.argmax(shares >= _ENOUGH * shares.max())), int(np.argmax(_TRIED == 1)))
-    return float(max(usual * _TRIED[k], _SMOOTH * planes[k][1]))
+    return float(max(usual * _TRIED[k], _SMOOTH * planes[k + _WIDER][1]))
 
 
 def _planes(points: NDArray[Any], voxel: float) -> tuple[float, float]:

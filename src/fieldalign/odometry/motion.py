@@ -6,8 +6,9 @@ from math import sqrt
 
 import numpy as np
 
+from .. import _core
 from ..fields.protocol import Floats
-from ..motions import exp_twist, inverse, log_motion
+from ..motions import exp_twist
 
 _REMEMBERED = 30  # steps, of how far off predictions were
 _UNKNOWN = 2.0    # voxels: how far off they may be at first
@@ -31,7 +32,7 @@ class SteadyMotion:
 
     def between(self, pose: Floats, seconds: float) -> Floats:
         """The velocity (6,) that leads to a pose (4, 4) in so many seconds."""
-        return log_motion(inverse(self.pose) @ pose) / seconds
+        return _core.relative_twist(self.pose, pose) / seconds
 
     def size(self, twist: Floats) -> float:
         """By how much a twist (6,) moves what is near the sensor (a length)."""

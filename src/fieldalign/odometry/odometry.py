@@ -73,11 +73,11 @@ class Odometry:
             tracker = self._begun(sweep) or tracker
             scan = thin_scan(sweep, tracker.measure, self.settings, self.deskew)
         clock.lap("thin")
-        placed = tracker.place(scan, elapsed, self._pace.interval, event)  # Gauss-Newton on pseudo points (eq. 11 to 16)
+        placed = tracker.place(scan, elapsed, self._pace.interval, event)     # Gauss-Newton (eq. 11 to 16)
         clock.lap("align")
         tracker.motion.follow(placed.pose, placed.seconds if placed.found else None)
         if placed.reason.is_on_map:
-            tracker.map.add(*scan.at_once(tracker.motion.velocity), placed.pose)  # and the target's field has grown
+            tracker.map.add(*scan.at_once(tracker.motion.velocity), placed.pose)  # the target's field has grown
         clock.lap("map")
         return self._told(placed, sweep, clock)
 

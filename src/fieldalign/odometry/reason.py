@@ -41,8 +41,8 @@ _SENTENCES = {
     Tracking.SPARSE: "Tracked, though the scan has far fewer points than those before it.",
     Tracking.GAP: "Tracked after a gap: scans between the last one and this one are missing.",
     Tracking.CLOCK_JUMPED: "Tracked, though the clock jumped: the scan was taken to follow the last one as usual.",
-    Tracking.DOUBTFUL: "Doubtful: far less of the scan agrees with the map than of those before; it may lie elsewhere.",
-    Tracking.RESTARTED: "Begun anew: too many scans did not lie on the map, so a new one was begun where the sensor was "
+    Tracking.DOUBTFUL: "Doubtful: far less of the scan agrees with the map than usual; it may lie elsewhere.",
+    Tracking.RESTARTED: "Begun anew: too many scans did not lie on the map; a new one begins where the sensor was "
     "thought to be.",
     Tracking.DEGENERATE: "Degenerate: the scan may slide or turn on the map without a difference; that part of the "
     "motion is the prediction's.",

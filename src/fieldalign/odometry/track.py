@@ -21,13 +21,13 @@ from .scan import Scan
 
 _STEPS, _STEPS_COARSE = 15, 30  # at most
 _FREE = 5           # steps, in which pseudo points find their planes anew; then in every third
-_DEVIATIONS = 3.0   # of residuals: one as large has a quarter of the weight
-_THICKNESS = 0.05   # voxels: no plane is taken for thinner, and no scale for finer
+_DEVIATIONS = 2.0   # of residuals: one as large has a quarter of the weight
+_THICKNESS = 0.025  # voxels: no plane is taken for thinner, and no scale for finer
 _FIRST_SCALE = 0.33  # of how far predictions are off, in the first step: what is off tells where to go
 _GATE = 3.0         # of how far predictions are off: beyond, a pseudo point has no partner
 _LEAST_GATE = 0.3   # voxels
 _KNOWN = 0.25       # of the pseudo points: where fewer are on known surface, the agreement of these tells little
-_STILL = 0.003      # voxels: steps no longer are the last
+_STILL = 0.005      # voxels: steps no longer are the last
 _RIM = 50           # voxels: at that range, turns no longer
 
 
