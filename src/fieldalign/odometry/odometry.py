@@ -14,7 +14,7 @@ from .measure import measure_of
 from .pace import Pace
 from .reason import Tracking
 from .result import OdometryResult
-from .scan import Sweep, sweep_of, thin_scan
+from .scan import Scan, Sweep, sweep_of, thin_scan
 from .settings import OdometrySettings
 from .tracker import Placed, Tracker
 
@@ -68,10 +68,10 @@ class Odometry:
         if tracker is None:
             return self._told(Placed(np.eye(4), elapsed, Tracking.EMPTY), sweep, clock)
         tracker.look_around(sweep)
-        scan = thin_scan(sweep, tracker.measure, self.settings, self.deskew)
+        scan = self._thinned(sweep, tracker)
         if tracker.is_worn(scan):
             tracker = self._begun(sweep) or tracker
-            scan = thin_scan(sweep, tracker.measure, self.settings, self.deskew)
+            scan = self._thinned(sweep, tracker)
         clock.lap("thin")
         placed = tracker.place(scan, elapsed, self._pace.interval, event)     # Gauss-Newton (eq. 11 to 16)
         clock.lap("align")
@@ -80,6 +80,10 @@ class Odometry:
             tracker.map.add(*scan.at_once(tracker.motion.velocity), placed.pose)  # the target's field has grown
         clock.lap("map")
         return self._told(placed, sweep, clock)
+
+    def _thinned(self, sweep: Sweep, tracker: Tracker) -> Scan:
+        wanted = tracker.pseudo_points(self.settings.pseudo_points)
+        return thin_scan(sweep, tracker.measure, self.settings.points, wanted, self.deskew)
 
     def _begun(self, sweep: Sweep) -> Tracker | None:
         """A tracker, begun with a scan that tells the lengths of the drive; it goes on from the one before."""

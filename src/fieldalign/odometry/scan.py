@@ -13,7 +13,6 @@ from ..clouds.cloud import PointCloud, as_points
 from ..errors import ArgumentError
 from ..fields.protocol import Floats
 from .measure import THINNING, Measure
-from .settings import OdometrySettings
 
 Rows = NDArray[np.float32]  # (., 4): a place in the sensor's frame, and seconds from the middle of the sweep
 
@@ -82,13 +81,13 @@ def sweep_of(cloud: PointCloud | ArrayLike, times: ArrayLike | None, stamp: floa
     return Sweep(points, seconds, (first + last) / 2, span, stamp)
 
 
-def thin_scan(sweep: Sweep, measure: Measure, settings: OdometrySettings, deskew: bool) -> Scan:
-    """Points for the map, one in 0.4 voxels, and of these pseudo points, one in a voxel."""
+def thin_scan(sweep: Sweep, measure: Measure, points: int, pseudo_points: int, deskew: bool) -> Scan:
+    """Of about so many points those for the map, one in 0.4 voxels, and of these so many pseudo points."""
     # An odd stride meets every beam, where points come one beam after the other.
-    stride = len(sweep.points) // settings.points | 1
+    stride = len(sweep.points) // points | 1
     kept = _core.thin_scan(
         sweep.points, sweep.times if deskew else None, sweep.middle or 0.0, stride, THINNING * measure.voxel,
         _NEAR * measure.voxel, measure.range,
     )
-    sparse, pseudo = _core.thin_twice(kept, measure.voxel, settings.pseudo_points)
+    sparse, pseudo = _core.thin_twice(kept, measure.voxel, pseudo_points)
     return Scan(kept, sparse, pseudo, deskew and sweep.times is not None)

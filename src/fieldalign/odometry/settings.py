@@ -11,16 +11,16 @@ from ..arguments import as_count, check_positive
 class OdometrySettings:
     """Choices of odometry. No length is asked for: all of them are read from the first scan.
 
-    voxel: edge of the map's voxels (the scans' unit); None: at which a scan's surface fills some 1500 cells, about a
-        hundredth of a rotating sensor's range.
-    pseudo_points: how many of a scan are aligned.
+    voxel: edge of the map's voxels (the scans' unit); None: read from the first scan, for a rotating sensor in a street
+        about a hundredth of its range.
+    pseudo_points: how many of a scan are to be aligned on planes of the map.
     points: of so many, evenly taken from a scan, the map is made.
 
     Raises ArgumentError for a value out of its range.
     """
 
     voxel: float | None = None
-    pseudo_points: int = 1500
+    pseudo_points: int = 1000
     points: int = 25_000
 
     def __post_init__(self) -> None:

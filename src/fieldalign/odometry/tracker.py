@@ -25,6 +25,7 @@ _LEAST_MET = 0.1           # of all pseudo points
 _DOUBTFUL = 0.8            # of the usual agreement; with less, a scan may lie elsewhere
 _SPARSE = 0.3              # of the usual number of points
 _EAGER = 0.1               # of the way that what is usual goes to the latest
+_USUAL_SHARE, _LEAST_SHARE = 0.67, 0.33  # of the pseudo points, that have a plane
 _PATIENCE = 5              # lost scans in a row, after which the map is begun anew
 _MEAGRE = 0.3              # of the second scan's points: a first scan with less is none to begin with
 _LOOKED = 10               # scans from one look at the range to the next
@@ -68,6 +69,7 @@ class Tracker:
         self._first: Scan | None = None
         self._scans = self._missed = 0          # scans in the map, and in a row since then those that are not
         self._points = self._agreement = 0.0    # what is usual
+        self._met = _USUAL_SHARE
         self._is_first = before is None
         if before is not None:
             self.motion.pose, self.motion.velocity = before.motion.pose, before.motion.velocity
@@ -78,6 +80,10 @@ class Tracker:
         too little to begin with."""
         is_meagre = self._scans == 1 and self._points < _MEAGRE * len(scan.points)
         return not scan.is_empty and (self._missed >= _PATIENCE or is_meagre)
+
+    def pseudo_points(self, on_planes: int) -> int:
+        """How many it takes for so many to come to lie on planes of the map, as it was of late."""
+        return round(on_planes / max(self._met, _LEAST_SHARE))
 
     def look_around(self, sweep: Sweep) -> None:
         """Now and then the range grows with what is seen."""
@@ -103,6 +109,7 @@ class Tracker:
         self._blind = np.zeros((6, 6)) if hold.is_whole else self._blind + self.motion.covariance
         placed = Placed(found.pose, seconds, self._judged(scan, laid, hold), found, hold, self._blind)
         self._scans, self._missed = self._scans + 1, 0
+        self._met += _EAGER * (found.met / found.points - self._met)
         self._points += _EAGER * (len(scan.points) - self._points)
         self._agreement += (_EAGER if self._agreement else 1.0) * (found.agreement - self._agreement)
         return placed
