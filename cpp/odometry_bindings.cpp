@@ -112,7 +112,8 @@ nb::dict tracked(VoxelMap& map, Scan scan, Pose4 start, Values origin, std::opti
     nb::gil_scoped_release free;
     found = track(map, scan_of(scan), motion_of(start.data()), about, loss, schedule, before, twists);
     loss.gate = s("certain_gate");
-    if (!is_whole) known = certainty_sums(map, found.scan, found.cells, found.pose, about, loss, found.sums.scale);
+    if (!is_whole)
+      known = certainty_sums(map, found.scan, found.cells, found.pose, about, loss, found.sums.scale, s("certain_flatness"));
   }
   nb::dict result;
   result["motion"] = pose_array(found.pose);

@@ -100,10 +100,10 @@ inline TrackSums track_sums(VoxelMap& map, std::span<const ScanPoint> scan, std:
 
 // What holds the pose and how its gradient scatters. A plane's normal is uncertain by its thickness over the width and
 // over the root of its count, and J J^T holds the square of that noise; it is taken off, so that nothing but surface
-// holds.
+// holds. Planes that are less flat may be edges, whose normals lie anywhere: they hold nothing.
 inline CertaintySums<6> certainty_sums(VoxelMap& map, std::span<const ScanPoint> scan,
                                        std::span<const std::int32_t> cells, const Motion& pose, Vec3 origin,
-                                       const TrackLoss& loss, double scale) {
+                                       const TrackLoss& loss, double scale, double certain_flatness) {
   CertaintySums<6> known;
   const RobustLoss robust{scale, 0, loss.gate};
   meet_planes(map, scan, cells, pose, origin, loss, [&](const Met& m) {
@@ -112,6 +112,7 @@ inline CertaintySums<6> certainty_sums(VoxelMap& map, std::span<const ScanPoint>
     const double w = weight_of({m.r, 1, n, n}, m.spread, robust) / (m.spread * m.spread);
     const auto row = row_of<6>(m.x, n);
     known.add_gradient(w * m.r, row);
+    if (m.plane->least > certain_flatness * m.plane->middle) return;
     const double tilt = m.plane->least / (m.plane->middle * m.count);  // variance of the normal, along an axis
     const auto [first, second] = across(n);
     const auto one = row_of<6>(m.x, first), two = row_of<6>(m.x, second);

@@ -34,9 +34,10 @@ def street():
 
 
 def tunnel():
-    """Bare walls, but for some niches before the beginning."""
+    """Bare walls, but for a gate behind the beginning and some pillars."""
     walls = [block(60, 5.5, 0, (240, 1, 7)), block(60, -5.5, 0, (240, 1, 7))]
     walls += [Box((60, 0, -0.5), (240, 12, 1)), Box((60, 0, 6.5), (240, 12, 1))]
+    walls += [block(-9, 3, 0, (0.5, 4, 7)), block(-9, -3, 0, (0.5, 4, 7))]
     return tuple([*walls, *(block(-8.0 + 6 * k, 4.6 * (-1) ** k, 0, (1.5, 1, 2 + k)) for k in range(5))])
 
 

@@ -23,6 +23,7 @@ _STEPS, _STEPS_COARSE = 15, 30  # at most
 _FREE = 5           # steps, in which pseudo points find their planes anew; then in every third
 _DEVIATIONS = 2.0   # of residuals: one as large has a quarter of the weight
 _THICKNESS = 0.025  # voxels: no plane is taken for thinner, and no scale for finer
+_CERTAIN = 0.25     # of the flatness asked for: thicker planes may be edges, and are not to say what holds the scan
 _FIRST_SCALE = 0.33  # of how far predictions are off, in the first step: what is off tells where to go
 _GATE = 3.0         # of how far predictions are off: beyond, a pseudo point has no partner
 _LEAST_GATE = 0.3   # voxels
@@ -107,6 +108,7 @@ def _settings(voxel: float, spread: float, steps: int) -> dict[str, float]:
         "steps": steps, "free_steps": _FREE, "fewest": FEWEST, "deviations": _DEVIATIONS, "thickness": thickness,
         "least_scale": thickness, "first_scale": _FIRST_SCALE * spread, "flatness": FLATNESS, "width": WIDTH * voxel,
         "gate": gate,
-        "certain_gate": _LEAST_GATE * voxel, "still_shift": _STILL * voxel, "still_turn": _STILL / _RIM,
+        "certain_gate": _LEAST_GATE * voxel,
+        "certain_flatness": _CERTAIN * FLATNESS, "still_shift": _STILL * voxel, "still_turn": _STILL / _RIM,
         "largest_turn": LARGEST_TURN,
     }
