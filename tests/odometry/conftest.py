@@ -27,7 +27,8 @@ def street():
     solids = [Box((0, 0, -0.5), (400, 60, 1))]
     for k in range(-4, 6):
         x = LENGTH * k
-        solids += [block(x + 4, 9, 0, (9, 5, 6)), block(x + 14, 10.5, 0, (7, 5, 8), 0.1), block(x + 7, -10, 0, (12, 6, 7))]
+        solids += [block(x + 4, 9, 0, (9, 5, 6)), block(x + 14, 10.5, 0, (7, 5, 8), 0.1)]
+        solids += [block(x + 7, -10, 0, (12, 6, 7))]
         solids += [block(x + 3, 4.5, 0, (4, 1.8, 1.4), 0.05), block(x + 15, -4.8, 0, (4.2, 1.8, 1.5))]
         solids += [block(x + 11, 6, 0, (0.3, 0.3, 5)), block(x + 18, -6, 0, (0.4, 0.4, 4))]
     return tuple(solids)
@@ -38,7 +39,7 @@ def tunnel():
     walls = [block(60, 5.5, 0, (240, 1, 7)), block(60, -5.5, 0, (240, 1, 7))]
     walls += [Box((60, 0, -0.5), (240, 12, 1)), Box((60, 0, 6.5), (240, 12, 1))]
     walls += [block(-9, 3, 0, (0.5, 4, 7)), block(-9, -3, 0, (0.5, 4, 7))]
-    return tuple([*walls, *(block(-8.0 + 6 * k, 4.6 * (-1) ** k, 0, (1.5, 1, 2 + k)) for k in range(5))])
+    return (*walls, *(block(-8.0 + 6 * k, 4.6 * (-1) ** k, 0, (1.5, 1, 2 + k)) for k in range(3)))
 
 
 @dataclass(frozen=True)
@@ -54,9 +55,8 @@ class Spinning:
         elevation = np.radians(np.linspace(-24, 8, 32))[:, None]
         times = start + PERIOD * np.arange(self.columns) / self.columns
         poses = np.stack([pose_at(t) for t in times])
-        beams = np.stack(
-            [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation) + 0 * azimuth], -1
-        )
+        across = np.cos(elevation)
+        beams = np.stack([across * np.cos(azimuth), across * np.sin(azimuth), np.sin(elevation) + 0 * azimuth], -1)
         ahead = np.einsum("aij,baj->bai", poses[:, :3, :3], beams).reshape(-1, 3)
         origins = np.broadcast_to(poses[:, :3, 3], beams.shape).reshape(-1, 3)
         ranges = cast(solids, origins, ahead)
@@ -72,7 +72,8 @@ def along_street(t):
 
 
 def through_tunnel(t):
-    return translation([10 * t, 0.5, 1.8])
+    """From rest to ten metres a second, and on."""
+    return translation([2.5 * t**2 if t < 2 else 10 * (t - 1), 0.5, 1.8])
 
 
 @cache
@@ -82,10 +83,18 @@ def cycle():
 
 @dataclass(frozen=True)
 class Drive:
-    """Scans with their times, and the truth: the sensor's pose in the middle of a sweep, as seen from the first one's."""
+    """Scans with their times, and the truth: the sensor's pose in the middle of a sweep, seen from the first one's."""
 
+    solids: tuple
     pose_at: object
     scan: object
+
+    def distance(self, points):
+        """Metres (n,) from places in the frame of the first pose to the nearest surface, along six directions."""
+        T = self.pose_at(PERIOD / 2)
+        places = points @ T[:3, :3].T + T[:3, 3]
+        rays = [cast(self.solids, places, np.tile(s * a, (len(places), 1))) for a in np.eye(3) for s in (-1.0, 1.0)]
+        return np.min(rays, axis=0)
 
     def pose(self, k):
         first, now = (self.pose_at(PERIOD * (i + 0.5)) for i in (0, k))
@@ -100,14 +109,14 @@ def drive():
         points, times = cycle()[k % CYCLE]
         return points, times + PERIOD * CYCLE * (k // CYCLE)
 
-    return Drive(along_street, scan)
+    return Drive(street(), along_street, scan)
 
 
 @pytest.fixture(scope="session")
 def dark():
     """60 metres through the tunnel."""
     scan = cache(lambda k: Spinning(columns=360).sweep(tunnel(), through_tunnel, PERIOD * k, k))
-    return Drive(through_tunnel, scan)
+    return Drive(tunnel(), through_tunnel, scan)
 
 
 @pytest.fixture(scope="session")
