@@ -75,7 +75,7 @@ class Odometry:
         clock.lap("thin")
         placed = tracker.place(scan, elapsed, self._pace.interval, event)     # Gauss-Newton (eq. 11 to 16)
         clock.lap("align")
-        tracker.motion.follow(placed.pose, placed.seconds if placed.found else None)
+        tracker.motion.follow(placed.pose, placed.seconds if placed.hold else None)
         if placed.reason.is_on_map:
             tracker.map.add(*scan.at_once(tracker.motion.velocity), placed.pose)  # the target's field has grown
         clock.lap("map")

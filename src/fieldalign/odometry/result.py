@@ -22,7 +22,8 @@ class OdometryResult:
         scans count as 1.
     reason: Tracking, what the step came to. tracked: whether the whole pose is the scan's, not the prediction's.
     points: how many pseudo points were aligned. agreement: share of them, of those on known surface, that lie on it.
-    iterations: how many. seconds: time by stage.
+    iterations: how many. seconds: time by stage. hold: the sums behind the covariance; None where nothing was aligned.
+    prediction: (6, 6), covariance of the predictions since all was held.
     """
 
     pose: Floats
@@ -33,7 +34,7 @@ class OdometryResult:
     iterations: int
     seconds: Mapping[str, float]
     hold: Hold | None
-    prediction: Floats  # (6, 6), covariance of the prediction since all was held
+    prediction: Floats
 
     @property
     def tracked(self) -> bool:
@@ -58,7 +59,9 @@ class OdometryResult:
     @property
     def unobservable(self) -> Floats:
         """(6, k), basis of the twists that nothing holds: along them the pose is the prediction's."""
-        return np.eye(6) if self._known is None else self._known.unobservable
+        if self._known is None:
+            return np.zeros((6, 0)) if self.reason is Tracking.FIRST else np.eye(6)
+        return self._known.unobservable
 
     @property
     def freedoms(self) -> tuple[Freedom, ...]:

@@ -16,8 +16,8 @@ from .measure import THINNING, Measure
 
 Rows = NDArray[np.float32]  # (., 4): a place in the sensor's frame, and seconds from the middle of the sweep
 
-FEWEST_PSEUDO = 50         # pseudo points: with fewer, a scan counts as empty
-_NEAR = 0.5          # voxels: what is nearer is the sensor itself, or a missing return written as zero
+_FEWEST = 50  # pseudo points: with fewer, a scan counts as empty
+_NEAR = 0.5   # voxels: what is nearer is the sensor itself, or a missing return written as zero
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,7 @@ class Scan:
     @property
     def is_empty(self) -> bool:
         """Whether there is too little to be aligned."""
-        return len(self.pseudo) < FEWEST_PSEUDO
+        return len(self.pseudo) < _FEWEST
 
     def all_at_once(self) -> Scan:
         """The same as if the times were not known."""

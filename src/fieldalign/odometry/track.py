@@ -105,10 +105,8 @@ def _settings(voxel: float, spread: float, steps: int) -> dict[str, float]:
     """The schedule on a map of such voxels, where guesses are so far off (lengths)."""
     thickness, gate = _THICKNESS * voxel, max(_GATE * spread, _LEAST_GATE * voxel)
     return {
-        "steps": steps, "free_steps": _FREE, "fewest": FEWEST, "deviations": _DEVIATIONS, "thickness": thickness,
-        "least_scale": thickness, "first_scale": _FIRST_SCALE * spread, "flatness": FLATNESS, "width": WIDTH * voxel,
-        "gate": gate,
-        "certain_gate": _LEAST_GATE * voxel,
-        "certain_flatness": _CERTAIN * FLATNESS, "still_shift": _STILL * voxel, "still_turn": _STILL / _RIM,
-        "largest_turn": LARGEST_TURN,
+        "steps": steps, "free_steps": _FREE, "still_shift": _STILL * voxel, "still_turn": _STILL / _RIM,
+        "largest_turn": LARGEST_TURN, "deviations": _DEVIATIONS, "first_scale": _FIRST_SCALE * spread,
+        "least_scale": thickness, "gate": gate, "fewest": FEWEST, "flatness": FLATNESS, "width": WIDTH * voxel,
+        "thickness": thickness, "certain_gate": _LEAST_GATE * voxel, "certain_flatness": _CERTAIN * FLATNESS,
     }
