@@ -20,14 +20,14 @@ def test_a_voxel_that_is_given_is_taken(drive):
 
 def test_far_outliers_and_missing_returns_do_not_count(drive):
     points, _ = drive.scan(0)
-    worse = np.vstack([points, np.full((3000, 3), np.nan), np.zeros((3000, 3)), [[1e6, 0, 0]]])
+    worse = np.vstack([points, np.full((3000, 3), np.nan), np.zeros((3000, 3)), [[1e12, 0, 0]]])
     assert measure_of(worse, None).range == pytest.approx(range_of(points), rel=0.1)
-    assert measure_of(worse, None).voxel == pytest.approx(natural_voxel(points), rel=0.1)
+    assert measure_of(worse, None).voxel == pytest.approx(natural_voxel(points, range_of(points)), rel=0.1)
 
 
 def test_noise_makes_voxels_larger(drive, rng):
     points, _ = drive.scan(0)
-    assert natural_voxel(points + rng.normal(0, 0.05, points.shape)) > natural_voxel(points)
+    assert natural_voxel(points + rng.normal(0, 0.05, points.shape), 30.0) > natural_voxel(points, 30.0)
 
 
 @pytest.mark.parametrize("points", [np.zeros((0, 3)), np.ones((500, 3)), np.full((500, 3), np.nan), np.eye(3)])

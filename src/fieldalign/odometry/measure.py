@@ -40,14 +40,15 @@ def measure_of(points: NDArray[Any], voxel: float | None) -> Measure | None:
     if len(seen) < _FEWEST_POINTS or not np.ptp(seen, axis=0).any():
         return None
     seen = np.ascontiguousarray(seen)
-    return Measure(voxel or natural_voxel(seen), range_of(seen))
+    reach = range_of(seen)
+    return Measure(voxel or natural_voxel(seen, reach), reach)
 
 
-def natural_voxel(points: NDArray[Any]) -> float:
-    """The edge (length) of voxels for the planes of a scan (N, 3): no smaller than where it shows some number of them,
-    where most of the planes show that ever do, and some multiple of these planes' thickness."""
+def natural_voxel(points: NDArray[Any], reach: float) -> float:
+    """The edge (length) of voxels for the planes of a scan (N, 3) within a range: no smaller than where it shows some
+    number of them, where most of the planes show that ever do, and some multiple of these planes' thickness."""
     tried = scale_of(points, 1, _CELLS).voxel * _TRIED
-    planes, cells, thickness = np.array([_planes(points, float(voxel)) for voxel in tried]).T
+    planes, cells, thickness = np.array([_planes(points, reach, float(voxel)) for voxel in tried]).T
     shares = (planes / np.maximum(cells, 1))[:-_WIDER]
     k = int(np.argmax(shares >= _ENOUGH * shares.max()))
     return float(max(_crossing(tried, planes), tried[k], _SMOOTH * thickness[k + _WIDER]))
@@ -65,10 +66,10 @@ def _crossing(tried: NDArray[np.float64], planes: NDArray[np.float64]) -> float:
     return float(tried[k] * (tried[k + 1] / tried[k]) ** share)
 
 
-def _planes(points: NDArray[Any], voxel: float) -> tuple[int, int, float]:
+def _planes(points: NDArray[Any], reach: float, voxel: float) -> tuple[int, int, float]:
     """How many planes there are, how many occupied voxels, and how thick the planes are (a length)."""
     voxels = _core.VoxelMap(voxel)
-    voxels.add(_core.thin_scan(points, None, 0.0, 1, THINNING * voxel, 0.0, np.inf), np.eye(4), np.inf)
+    voxels.add(_core.thin_scan(points, None, 0.0, 1, THINNING * voxel, 0.0, reach), np.eye(4), np.inf)
     least, middle = voxels.planes(FEWEST)[3].T
     flat = (least < FLATNESS * middle) & (middle > (WIDTH * voxel) ** 2)
     return int(flat.sum()), len(voxels), float(np.sqrt(np.median(least[flat]))) if flat.any() else 0.0
