@@ -12,6 +12,7 @@ from .clouds.thinning import thin
 from .dof import Dof
 from .errors import ArgumentError, CloudFileError, FieldalignError, FieldError, MissingExtraError, RunError
 from .inspection import Deviation, deviation
+from .odometry import Odometry, OdometryResult, OdometrySettings, Tracking
 from .prepare import prepare
 from .prepared import PreparedCloud
 from .register import register
@@ -34,6 +35,9 @@ __all__ = [
     "FieldalignError",
     "Freedom",
     "MissingExtraError",
+    "Odometry",
+    "OdometryResult",
+    "OdometrySettings",
     "PairResult",
     "PointCloud",
     "PreparedCloud",
@@ -41,6 +45,7 @@ __all__ = [
     "RegistrationResult",
     "RunError",
     "Settings",
+    "Tracking",
     "assemble",
     "deviation",
     "fields",

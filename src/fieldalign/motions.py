@@ -22,22 +22,7 @@ def exp_twist(twist: Matrix) -> Matrix:
 
 def log_motion(T: Matrix) -> Matrix:
     """The twist (6,) of a rigid motion (4, 4): Exp(log_motion(T)) = T, turning by at most pi."""
-    R, t = T[:3, :3], T[:3, 3]
-    axial = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / 2
-    sine, cosine = np.linalg.norm(axial), (np.trace(R) - 1) / 2
-    angle = float(np.arctan2(sine, cosine))
-    if cosine > -0.9:
-        w = axial * (angle / sine if sine > 1e-8 else 1.0)
-    else:  # near half a turn the axis is the direction that the symmetric part keeps
-        symmetric = (R + R.T) / 2 - cosine * np.eye(3)
-        axis = symmetric[np.argmax(np.diag(symmetric))]
-        axis = axis / np.linalg.norm(axis)
-        w = axis * (angle if axis @ axial >= 0 else -angle)
-    # v solves V v = t, where V is the left Jacobian of w (Barfoot, State Estimation for Robotics, 7.1.3).
-    K = np.cross(np.eye(3), w)
-    half = angle / 2
-    share = 1 / 12 if angle < 1e-4 else (1 - half / np.tan(half)) / angle**2
-    return np.concatenate([w, t - K @ t / 2 + share * (K @ (K @ t))])
+    return _core.log_motion(np.ascontiguousarray(T, float))
 
 
 def inverse(T: Matrix) -> Matrix:
