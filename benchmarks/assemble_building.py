@@ -136,7 +136,10 @@ def _run(job: Path) -> None:
 
     asked = json.loads(job.read_text())
     cpu = time.perf_counter()
-    found = fa.assemble(asked["paths"], dof=asked["dof"], executor=asked["executor"], seed=0, progress=_progress())
+    found = fa.assemble(
+        asked["paths"], dof=asked["dof"], sensor_at_origin=True, executor=asked["executor"], seed=0,
+        progress=_progress(),
+    )
     largest = set(found.components[0]) if found.components else set()
     poses = np.stack([found.poses[k] if k in largest else np.full((4, 4), np.nan) for k in range(len(asked["paths"]))])
     told = {

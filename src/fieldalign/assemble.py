@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -32,6 +32,7 @@ def assemble(
     pose_sigma: tuple[float, float] | None = None,
     fixed: Sequence[int] = (),
     ordered: bool = False,
+    sensor_at_origin: bool = False,
     dof: Any = None,
     executor: AnyExecutor = None,
     run_folder: str | os.PathLike[str] | None = None,
@@ -47,6 +48,9 @@ def assemble(
         they then also pull at the result, whose world is theirs.
     fixed: indices of scans whose given pose is not to change.
     ordered: successive scans are neighbours.
+    sensor_at_origin: each scan is in the frame of its own sensor, unless it has a viewpoint that says otherwise. Where
+        a sensor looked through what another scan shows, the two do not lie like that: so rooms that look alike are told
+        apart.
     dof: "levelled" (all scans know which way is up), "planar" or "translation": what their poses may differ by.
     executor, run_folder, threads: as in `fa.register_many`. The run folder also keeps the thinned scans.
     progress: called as progress(stage, finished, of).
@@ -72,8 +76,9 @@ def assemble(
     chosen, seed = as_executor(executor), as_count(seed, "seed", 0)
     used = chosen.threads if threads is None else resolve_threads(threads)
     settings = told({"seed": seed, "dof": freedoms, "poses": [None if T is None else T.tolist() for T in given.poses],
-                     "sigma": given.sigma, "fixed": given.fixed, "ordered": bool(ordered)})
-    with Workshop(clouds, chosen, run_folder, settings, progress, used) as shop:
+                     "sigma": given.sigma, "fixed": given.fixed, "ordered": bool(ordered),
+                     "sensor_at_origin": bool(sensor_at_origin)})
+    with Workshop(clouds, chosen, run_folder, settings, progress, used, bool(sensor_at_origin)) as shop:
         return build(shop, given, bool(ordered), freedoms, seed)
 
 
@@ -88,10 +93,25 @@ def _given(
     if sigma is not None:
         if poses is None:
             raise ArgumentError("pose_sigma says how well poses are known, but there are none")
-        for value in sigma:
-            check_positive("pose_sigma", value)
-    for k in fixed:
-        if not 0 <= k < count or known[k] is None:
-            raise ArgumentError(f"fixed must name clouds whose pose is given, but names {k!r}")
+        sigma = _sigma(sigma)
     rigid = [None if T is None else as_rigid(T, f"poses[{k}]") for k, T in enumerate(known)]
-    return Given(rigid, None if sigma is None else (float(np.radians(sigma[0])), float(sigma[1])), tuple(fixed))
+    return Given(rigid, sigma, _fixed(fixed, known))
+
+
+def _sigma(sigma: Any) -> tuple[float, float]:
+    """In radians and a length."""
+    try:
+        turn, shift = sigma
+    except (TypeError, ValueError):
+        raise ArgumentError(f"pose_sigma must be (degrees, length), but is {sigma!r}") from None
+    for value in (turn, shift):
+        check_positive("pose_sigma", value)
+    return float(np.radians(turn)), float(shift)
+
+
+def _fixed(fixed: Any, known: Sequence[Any]) -> tuple[int, ...]:
+    may = {k for k, pose in enumerate(known) if pose is not None}
+    wrong = [k for k in fixed if k not in may] if isinstance(fixed, Iterable) else [fixed]
+    if wrong:
+        raise ArgumentError(f"fixed must be indices of clouds whose pose is given, but holds {wrong[0]!r}")
+    return tuple(int(k) for k in fixed)

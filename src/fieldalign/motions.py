@@ -25,6 +25,13 @@ def log_motion(T: Matrix) -> Matrix:
     return _core.log_motion(np.ascontiguousarray(T, float))
 
 
+def left_jacobian_inverse(w: Matrix) -> Matrix:
+    """(3, 3): by what the rotation vector w (3,) changes when Exp(w) is turned a little on its left; it is also what
+    makes v of a twist (w, v) from the shift of its motion (Barfoot, State Estimation for Robotics, 7.1.3)."""
+    turn = exp_twist(np.r_[w, 0.0, 0.0, 0.0])
+    return np.stack([log_motion(translation(axis) @ turn)[3:] for axis in np.eye(3)], axis=1)
+
+
 def inverse(T: Matrix) -> Matrix:
     """The inverse of rigid motions (..., 4, 4)."""
     back = np.swapaxes(T[..., :3, :3], -1, -2)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections import Counter
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -12,12 +13,11 @@ from numpy.typing import NDArray
 from ..clock import Clock
 from ..dof import Dof
 from ..fields.protocol import Floats
-from ..motions import inverse
-from ..verdict import Evidence
+from ..motions import inverse, reach_of
 from .assembly import Assembly
 from .choice import Choice, Pairs
-from .consensus import Consensus, consensus
 from .fused import fused
+from .graph import Graph
 from .joint import Pull
 from .pair_result import PairResult
 from .pose_graph import Edge, linearised, optimise
@@ -29,9 +29,11 @@ from .world import Given, anchored
 
 _TILE = 16          # scans on a side of a tile of glances
 _OVERLAP = 0.3      # of either scan: pairs that overlap so much, by their poses, are registered, too
+_NEAR = 20          # scans around each one, of which that is asked
 _NEIGHBOURS = 3     # of these, for each scan
-_ROUNDS = 3         # of the joint refinement
-_MODEL = 0.25       # of the median voxel: the thinning of a model
+_ROUNDS = 3         # of the joint refinement, at most
+_STILL = 2e-3       # voxels: a step that moves no place further is its last
+_MODEL = 0.25       # of a component's median voxel: the thinning of its model
 
 
 def build(shop: Workshop, given: Given, ordered: bool, dof: Dof | None, seed: int) -> Assembly:
@@ -40,16 +42,20 @@ def build(shop: Workshop, given: Given, ordered: bool, dof: Dof | None, seed: in
     lengths, broken = shop.thin()
     clock.lap("read")
     known = np.array([k in lengths for k in range(len(shop.clouds))])
-    likeness = _near(given, lengths) if given.is_useful else _glances(shop, known, seed)
+    graph = Graph(lengths, len(known), seed)
+    likeness = _near(given, lengths) if given.is_useful else _glances(shop, known, graph.unit, dof, seed)
     clock.lap("glance")
-    graph = _Graph(lengths, len(known), seed)
     choice = Choice(likeness, ordered, known)
     pairs = choice.first()
     while pairs:
         graph.add(_related(shop, pairs, given, dof, seed))
         pairs = choice.more(graph.component)
     clock.lap("pairs")
-    graph.add(_related(shop, choice.add(_overlapping(shop, graph)), graph.guesses(), dof, seed))
+    while graph.check(seen := _seen(shop, graph)):
+        graph.add(_related(shop, choice.more(graph.component), given, dof, seed))
+    clock.lap("check")
+    near = choice.add(_overlapping(seen))
+    graph.add(_related(shop, near, graph.guesses(), dof, seed))
     clock.lap("overlaps")
     poses: list[Any] = [None] * len(known)
     covariances: list[Any] = [None] * len(known)
@@ -58,11 +64,10 @@ def build(shop: Workshop, given: Given, ordered: bool, dof: Dof | None, seed: in
         for row, scan in enumerate(members):
             poses[scan], covariances[scan] = placed[row], known_by[row]
     clock.lap("refine")
-    voxel = _MODEL * float(np.median([voxel for voxel, _ in lengths.values()])) if lengths else 0.0
-    models = [
-        fused(members, lambda k: read_scan(shop.path(k)), poses, voxel, shop.threads)
-        for members in graph.components
-    ]
+    models = []
+    for members in graph.components:
+        voxel = _MODEL * float(np.median([lengths[k][0] for k in members]))
+        models.append(fused(members, lambda k: read_scan(shop.path(k)), poses, voxel, shop.threads))
     clock.lap("fuse")
     return Assembly(
         poses, covariances, graph.components, graph.told(believed=True), graph.told(believed=False),
@@ -70,107 +75,7 @@ def build(shop: Workshop, given: Given, ordered: bool, dof: Dof | None, seed: in
     )
 
 
-class _Graph:
-    """All that was found of pairs, and what follows from it."""
-
-    def __init__(self, lengths: dict[int, tuple[float, float]], count: int, seed: int) -> None:
-        self._lengths, self._count, self._seed = lengths, count, seed
-        self.results: dict[tuple[int, int], PairResult] = {}
-        self._consensus: Consensus | None = None
-        self.component: NDArray[np.int64] = np.arange(count)
-        self.components: list[list[int]] = []
-
-    def add(self, results: dict[tuple[int, int], PairResult]) -> None:
-        """Takes the results of pairs (i, j), and decides anew whom to believe."""
-        self.results |= results
-        self.pairs = [pair for pair, result in self.results.items() if usable(result)]
-        if not self.pairs:
-            return
-        self.edges = [_edge_of(*pair, self.results[pair]) for pair in self.pairs]
-        sizes = [(self._lengths[i], self._lengths[j]) for i, j in self.pairs]
-        voxels = np.array([max(a[0], b[0]) for a, b in sizes])
-        extents = np.array([min(a[1], b[1]) for a, b in sizes])
-        self._consensus = consensus(self._count, self.edges, voxels, extents, self._seed)
-        self.component = self._joined()
-        numbers, sizes_of = np.unique(self.component, return_counts=True)
-        self.components = sorted(
-            (np.flatnonzero(self.component == c).tolist() for c in numbers[sizes_of > 1]),
-            key=lambda members: (-len(members), members),
-        )
-
-    @property
-    def poses(self) -> Floats:
-        """The poses (n, 4, 4) along the tree that is believed."""
-        return np.tile(np.eye(4), (self._count, 1, 1)) if self._consensus is None else self._consensus.poses
-
-    def believed(self, members: Sequence[int]) -> list[Edge]:
-        """The edges between some scans that the others do not contradict."""
-        inside = set(members)
-        return [e for e, ok in self._judged() if ok and e.i in inside and e.j in inside]
-
-    def guesses(self) -> Given:
-        """The poses, as a guess for pairs within a component."""
-        return Given(list(self.poses), None, (), is_rough=False)
-
-    def told(self, believed: bool) -> list[tuple[int, int, PairResult]]:
-        """The pairs that are believed, or not."""
-        return [(e.i, e.j, self.results[e.i, e.j]) for e, ok in self._judged() if ok == believed]
-
-    def reasons_of(self, scans: Iterable[int]) -> dict[int, str]:
-        """Why scans are in no component."""
-        return {k: self._reason_of(k) for k in scans}
-
-    def _judged(self) -> Iterable[tuple[Edge, bool]]:
-        if self._consensus is None:
-            return []
-        same = [self.component[e.i] == self.component[e.j] for e in self.edges]
-        return zip(self.edges, self._consensus.believed & np.array(same), strict=True)
-
-    def _joined(self) -> NDArray[np.int64]:
-        """The component (n,) of each scan. One edge joins two scans if it is accepted; edges that hold a pose in part
-        only, as along a street, join where at least two agree."""
-        assert self._consensus is not None
-        label = np.arange(self._count)
-        weak: list[Edge] = []
-        for edge, ok in zip(self.edges, self._consensus.believed, strict=True):
-            if ok and self.results[edge.i, edge.j].accepted:
-                label[label == label[edge.j]] = label[edge.i]
-            elif ok:
-                weak.append(edge)
-        while True:
-            between: dict[tuple[int, int], int] = {}
-            for edge in weak:
-                a, b = sorted((int(label[edge.i]), int(label[edge.j])))
-                between[a, b] = between.get((a, b), 0) + (a != b)
-            joined = [pair for pair, number in between.items() if number >= 2]
-            if not joined:
-                return label
-            label[label == joined[0][1]] = joined[0][0]
-
-    def _reason_of(self, scan: int) -> str:
-        asked = [(r.evidence.strength if r.evidence else 0.0, r) for pair, r in self.results.items() if scan in pair]
-        if not asked:
-            return "no other scan looks like it: no pair was worth a registration"
-        if any(result.accepted for _, result in asked):
-            return "the pairs that were accepted with it are contradicted by the others"
-        best = max(asked, key=lambda pair: pair[0])[1]
-        return f"none of {len(asked)} registrations was accepted; the best: {best.verdict}"
-
-
-def usable(result: PairResult) -> bool:
-    """Whether a pair says something of its poses: it is accepted, or would be if its pose were held on all sides."""
-    if result.accepted:
-        return True
-    evidence: Evidence | None = result.evidence
-    return evidence is not None and replace(evidence, hold=1.0).reason.accepts
-
-
-def _edge_of(i: int, j: int, result: PairResult) -> Edge:
-    strength = result.evidence.strength if result.evidence else 1.0
-    return Edge(i, j, result.T_target_source, result.information, result.reference_point, max(strength, 1e-3))
-
-
-def _glances(shop: Workshop, known: NDArray[np.bool_], seed: int) -> Floats:
+def _glances(shop: Workshop, known: NDArray[np.bool_], unit: float, dof: Dof | None, seed: int) -> Floats:
     """The likeness (n, n) of scans, by a glance at each pair."""
     scans = np.flatnonzero(known)
     tiles = [scans[k : k + _TILE] for k in range(0, len(scans), _TILE)]
@@ -180,7 +85,7 @@ def _glances(shop: Workshop, known: NDArray[np.bool_], seed: int) -> Floats:
             names = [name_of(k) for k in rows], [name_of(k) for k in columns]
             tasks.append(Task(f"glance {names[0][0]} {names[1][0]}", tuple(sorted({*names[0], *names[1]})), names))
     likeness = np.zeros((len(known), len(known)))
-    found = shop.do("glancing", Glances(seed), tasks, plain=lambda scores: scores)
+    found = shop.do("glancing", Glances(unit, seed, dof), tasks, plain=lambda scores: scores)
     for task in tasks:
         done = found[task.key]
         if done.error is None:
@@ -217,54 +122,60 @@ def _related(
     return results
 
 
-def _overlapping(shop: Workshop, graph: _Graph) -> Pairs:
-    """Pairs that were not tried, but overlap well by their poses: each scan's best few."""
-    candidates = []
-    for members in graph.components:
-        places = {k: graph.poses[k][:3, 3] for k in members}
-        reach = {k: graph._lengths[k][1] / 2 for k in members}
-        candidates += [
-            (i, j) for i in members for j in members
-            if i < j and (i, j) not in graph.results and np.linalg.norm(places[i] - places[j]) < min(reach[i], reach[j])
-        ]
-    tasks = []
-    for i, j in candidates:
-        names = name_of(i), name_of(j)
-        tasks.append(Task(f"overlap {i} {j}", names, (*names, inverse(graph.poses[i]) @ graph.poses[j])))
-    found = shop.do("comparing", Overlaps(), tasks)
-    share = {pair: found[task.key].value or 0.0 for pair, task in zip(candidates, tasks, strict=True)}
+def _seen(shop: Workshop, graph: Graph) -> dict[tuple[int, int], tuple[float, float]]:
+    """Of pairs that were not tried but lie near by their poses: how much overlaps, and how much was looked through."""
+    tasks, partners = [], graph.nearby(_NEAR)
+    for i, near in partners.items():
+        names = [name_of(j) for j in near]
+        poses = inverse(graph.poses[i]) @ graph.poses[near]
+        tasks.append(Task(f"overlaps {i}", (name_of(i), *names), (name_of(i), names, poses)))
+    found = shop.do("comparing", Overlaps(graph.unit), tasks)
+    return {
+        (i, j): shares for i, task in zip(partners, tasks, strict=True)
+        for j, shares in zip(partners[i], found[task.key].value or [], strict=False)
+    }
+
+
+def _overlapping(seen: Mapping[tuple[int, int], tuple[float, float]]) -> Pairs:
+    """Those that overlap well: each scan's best few."""
     chosen: Pairs = []
-    asked = dict.fromkeys(range(len(shop.clouds)), 0)
-    for i, j in sorted(share, key=lambda pair: -share[pair]):
-        if share[i, j] >= _OVERLAP and min(asked[i], asked[j]) < _NEIGHBOURS:
-            asked[i], asked[j] = asked[i] + 1, asked[j] + 1
+    asked: Counter[int] = Counter()
+    for i, j in sorted(seen, key=lambda pair: -seen[pair][0]):
+        if seen[i, j][0] >= _OVERLAP and min(asked[i], asked[j]) < _NEIGHBOURS:
+            asked.update((i, j))
             chosen.append((i, j))
     return chosen
 
 
 def _refined(
-    shop: Workshop, graph: _Graph, members: list[int], given: Given, dof: Dof | None
+    shop: Workshop, graph: Graph, members: list[int], given: Given, dof: Dof | None
 ) -> tuple[Floats, Floats]:
     """The poses (n, 4, 4) of a component's scans and their covariances (n, 6, 6)."""
     row = {scan: k for k, scan in enumerate(members)}
     edges = [replace(e, i=row[e.i], j=row[e.j]) for e in graph.believed(members)]
-    poses, anchors = anchored(graph.poses[members], members, given, dof)
+    world, poses, anchors = anchored(graph.poses[members], members, given, dof)
     poses = optimise(poses, edges, anchors)
+    reach = 2 * max(float(np.linalg.norm(edge.reference)) for edge in edges)
     for _ in range(_ROUNDS):
-        system = anchors.system(poses)
-        for edge, pull in _pulled(shop, members, poses, edges, both_ways=True):
+        system, known = anchors.system(poses), []
+        for edge, pull in _pulled(shop, members, poses, edges):
             A_i, A_j = edge.jacobians(poses)
             system.add({edge.i: A_i, edge.j: A_j}, pull.H, pull.g)
-        poses = anchors.moved(poses, system.step())
-    final = [edge for edge, _ in _pulled(shop, members, poses, edges, both_ways=False)]
-    return poses, linearised(poses, final, anchors).covariances()
+            known += [edge] * (edge.i < edge.j)  # the reverse knows the same
+        step = system.step()
+        poses = anchors.moved(poses, step)
+        if max(reach_of(x, reach) for x in step) < _STILL * graph.unit:
+            break
+    covariances = linearised(poses, known, anchors).covariances()
+    poses = world @ poses
+    for scan in set(given.fixed) & set(members):
+        poses[row[scan]] = given.poses[scan]  # to the last bit
+    return poses, covariances
 
 
-def _pulled(
-    shop: Workshop, members: list[int], poses: Floats, edges: list[Edge], both_ways: bool
-) -> list[tuple[Edge, Pull]]:
+def _pulled(shop: Workshop, members: list[int], poses: Floats, edges: list[Edge]) -> list[tuple[Edge, Pull]]:
     """What the fields say at the present poses: of each edge, and of its reverse."""
-    ends = [(e.i, e.j) for e in edges] + [(e.j, e.i) for e in edges if both_ways]
+    ends = [(e.i, e.j) for e in edges] + [(e.j, e.i) for e in edges]
     tasks = []
     for i, j in ends:
         a, b = name_of(members[i]), name_of(members[j])

@@ -11,9 +11,9 @@ from ..fields.protocol import Floats
 
 _AT_FIRST = 3     # likeliest partners of a scan
 _THEN = 2         # more of them in each round, for scans whose component is not whole
-_MOST = 5         # pairs that a scan asks for, of those that glances propose
+_MOST = 7         # pairs that a scan asks for, of those that glances propose
 _FEW = 12         # scans of which all pairs are tried
-_HOPE = 0.06      # the score of a glance that is worth a try
+_HOPE = 0.02      # the score of a glance that is worth a try
 
 Pairs = list[tuple[int, int]]
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..dof import Allowed
 from ..fields.protocol import Floats
-from ..motions import adjoint, exp_twist, inverse, log_motion, orthonormal, reach_of, translation
+from ..motions import adjoint, exp_twist, inverse, left_jacobian_inverse, log_motion, orthonormal, reach_of, translation
 
 _ITERATIONS = 50
 _STILL = 1e-10   # of the lever: a step that moves no scan further is the last
@@ -36,9 +36,12 @@ class Edge:
 
     def error(self, poses: Floats) -> Floats:
         """The twist (6,), about the reference, by which the poses (n, 4, 4) differ from what the edge says."""
+        return self.error_of(inverse(poses[self.i]) @ poses[self.j])
+
+    def error_of(self, T_ij: Floats) -> Floats:
+        """The same for a relative pose (4, 4)."""
         to_reference = translation(-self.reference)
-        off = inverse(poses[self.i]) @ poses[self.j] @ inverse(self.T_ij)
-        return log_motion(to_reference @ off @ inverse(to_reference))
+        return log_motion(to_reference @ T_ij @ inverse(self.T_ij) @ inverse(to_reference))
 
     def jacobians(self, poses: Floats) -> tuple[Floats, Floats]:
         """Derivatives (6, 6) of the error by the perturbations of pose i and of pose j, where the error is small."""
@@ -82,7 +85,7 @@ class NormalEquations:
             blocks[k] = factor.solve(columns)[6 * k : 6 * k + 6]
         free = np.einsum("kab->kb", np.abs(self._bases)) > 0
         blocks *= free[:, :, None] * free[:, None]  # what is not free has a pivot of its own
-        return np.asarray(self._bases @ blocks @ np.swapaxes(self._bases, 1, 2))
+        return _no_less_than_nothing(self._bases @ blocks @ np.swapaxes(self._bases, 1, 2))
 
     def _factor(self) -> Any:
         from scipy.sparse import csc_matrix, diags
@@ -98,10 +101,17 @@ class NormalEquations:
         return splu(csc_matrix(H + diags(pivots)))
 
 
+def _no_less_than_nothing(covariances: Floats) -> Floats:
+    """Covariances (n, 6, 6) without the rounding that makes the least of their variances negative."""
+    variances, axes = np.linalg.eigh((covariances + np.swapaxes(covariances, 1, 2)) / 2)
+    return np.asarray(axes * np.maximum(variances, 0)[:, None] @ np.swapaxes(axes, 1, 2))
+
+
 @dataclass(frozen=True, eq=False)
 class Anchors:
     """What holds poses in the world. fixed: rows of those that do not move. priors: by row, a pose (4, 4) and the
-    information (6, 6) of a perturbation of it. allowed: what the dof leaves free, or None."""
+    information (6, 6) of the turn from it and of the shift, both in its own frame. allowed: what the dof leaves free,
+    or None."""
 
     fixed: Sequence[int]
     priors: Mapping[int, tuple[Floats, Floats]] = field(default_factory=dict)
@@ -111,13 +121,26 @@ class Anchors:
         """The normal equations about some poses, with the terms of the priors."""
         system = NormalEquations(poses, self.fixed, self.allowed)
         for k, (pose, information) in self.priors.items():
-            system.add({k: np.eye(6)}, information, information @ log_motion(inverse(pose) @ poses[k]))
+            error, jacobian = _off(inverse(pose) @ poses[k])
+            system.add({k: jacobian}, information, information @ error)
         return system
 
     def moved(self, poses: Floats, step: Floats) -> Floats:
         """Poses (n, 4, 4) after perturbations (n, 6)."""
         poses = np.stack([orthonormal(T @ exp_twist(x)) for T, x in zip(poses, step, strict=True)])
         return poses if self.allowed is None else self.allowed.nearest(poses)
+
+
+def _off(T: Floats) -> tuple[Floats, Floats]:
+    """The rotation vector and the shift (6,) of a motion (4, 4), and how a perturbation on its right changes them.
+
+    Not a twist, whose shift grows with the turn: a place that is known says nothing of the turn.
+    """
+    w = log_motion(T)[:3]
+    jacobian = np.zeros((6, 6))
+    jacobian[:3, :3] = left_jacobian_inverse(w).T  # on the right: of -w
+    jacobian[3:, 3:] = T[:3, :3]
+    return np.r_[w, T[:3, 3]], jacobian
 
 
 def optimise(poses: Floats, edges: Sequence[Edge], anchors: Anchors) -> Floats:

@@ -39,15 +39,18 @@ class ThinScan:
         self.__dict__.update(state)
 
 
-def thinned(cloud: CloudLike, name: str, threads: int) -> ThinScan:
+def thinned(cloud: CloudLike, name: str, threads: int, sensor_at_origin: bool = False) -> ThinScan:
     """A scan of any size, or the surface of a field, as few points as a registration can use.
+
+    sensor_at_origin: where the scan itself does not say where its sensor stood, it was at the origin.
 
     Raises what prepare() raises, in the name of the scan.
     """
     prepared = prepare_named(cloud, name, threads, drop_nonfinite=True)
     assert isinstance(prepared, PreparedCloud)
     points = np.asarray(prepared.fine.points, float)
-    return ThinScan(points, prepared.eye, prepared.scale.voxel, prepared.extent, prepared.dropped)
+    eye = np.zeros(3) if prepared.eye is None and sensor_at_origin else prepared.eye
+    return ThinScan(points, eye, prepared.scale.voxel, prepared.extent, prepared.dropped)
 
 
 def write_scan(path: Path, scan: ThinScan) -> None:

@@ -29,14 +29,15 @@ class Workshop:
     """Where the scans of an assembly lie, and the executor and the record of what is done with them.
 
     folder: of the run, which goes on where it ended; None: a temporary one. progress: called as progress(stage,
-    finished, of). Use `with`.
+    finished, of). sensor_at_origin: of scans that do not say where their sensor stood. Use `with`.
     """
 
     def __init__(
         self, clouds: Sequence[CloudLike], executor: Executor, folder: Any, settings: Mapping[str, Any],
-        progress: Progress | None, threads: int,
+        progress: Progress | None, threads: int, sensor_at_origin: bool = False,
     ) -> None:
         self.clouds, self.executor, self.threads = clouds, executor, threads
+        self._sensor_at_origin = sensor_at_origin
         self._progress = progress or (lambda stage, finished, of: None)
         with ExitStack() as opened:
             self._record = None
@@ -58,8 +59,10 @@ class Workshop:
     def thin(self) -> tuple[dict[int, tuple[float, float]], dict[int, str]]:
         """Thins each scan into a file. Voxel and extent of each that can be read, and of the others why not."""
         missing = [k for k in range(len(self.clouds)) if not self.path(k).exists()]
-        items = {name_of(k): partial(thinned, _absolute(self.clouds[k]), _called(self.clouds[k], k), self.threads)
-                 for k in missing}
+        items = {}
+        for k in missing:
+            cloud, name = _absolute(self.clouds[k]), _called(self.clouds[k], k)
+            items[name_of(k)] = partial(thinned, cloud, name, self.threads, self._sensor_at_origin)
         broken = {}
         for done in self._watched("reading", fetch, [Task(name, (name,), name) for name in items], items):
             if done.error is None:

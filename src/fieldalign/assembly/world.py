@@ -38,8 +38,9 @@ class Given:
         return inverse(one) @ other
 
 
-def anchored(poses: Floats, members: Sequence[int], given: Given, dof: Dof | None) -> tuple[Floats, Anchors]:
-    """The poses (n, 4, 4) of a component's scans in its world, and what holds them there."""
+def anchored(poses: Floats, members: Sequence[int], given: Given, dof: Dof | None) -> tuple[Floats, Floats, Anchors]:
+    """What takes the frame of a component's poses (n, 4, 4) into its world (4, 4), the poses in that frame, and what
+    holds them there. So a turn that all scans share is no matter of the dof."""
     row_of = {k: row for row, k in enumerate(members) if given.poses[k] is not None}
     fixed = [row_of[k] for k in given.fixed if k in row_of]
     priors = {}
@@ -47,14 +48,17 @@ def anchored(poses: Floats, members: Sequence[int], given: Given, dof: Dof | Non
         turn, shift = given.sigma
         information = np.diag([turn**-2.0] * 3 + [shift**-2.0] * 3)
         priors = {row: (np.asarray(given.poses[k]), information) for k, row in row_of.items() if row not in fixed}
-    poses = _world(poses, members, given, row_of, fixed) @ poses
+    allowed = None if dof is None else allowed_poses(dof, None, np.zeros(3), np.zeros(3), target_is_held=True)
+    world = _world(poses, members, given, row_of, fixed)
+    if allowed is not None and allowed.turns.any() and not fixed:
+        world[:3, :3] = allowed.nearest(world[None])[0, :3, :3]  # upright, as the scans are
+    priors = {row: (inverse(world) @ pose, information) for row, (pose, information) in priors.items()}
     if not fixed and not priors:
         fixed = [next(iter(row_of.values()), 0)]
-    for row in fixed:
-        if given.poses[members[row]] is not None:
-            poses[row] = given.poses[members[row]]
-    allowed = None if dof is None else allowed_poses(dof, None, np.zeros(3), np.zeros(3), target_is_held=True)
-    return poses, Anchors(fixed, priors, allowed)
+    poses = poses.copy()
+    for row in set(fixed) & set(row_of.values()):
+        poses[row] = inverse(world) @ np.asarray(given.poses[members[row]])
+    return world, poses, Anchors(fixed, priors, allowed)
 
 
 def _world(

@@ -12,8 +12,7 @@ import numpy as np
 
 import fieldalign as fa
 
-from ..errors import ArgumentError
-from ..whole_file import replacing
+from .files import write_text
 
 
 class Told(Protocol):
@@ -30,13 +29,7 @@ def check_json(path: str | None) -> None:
 
 def write_json(result: Told, path: str | None) -> None:
     """Writes the result to a file, whole or not at all; nothing for None and for "-", which is stdout."""
-    if path is None or path == "-":
-        return
-    try:
-        with replacing(path) as unfinished:
-            unfinished.write_text(as_json(result))
-    except OSError as error:
-        raise ArgumentError(f"{path} cannot be written: {error.strerror or error}") from error
+    write_text(path, as_json(result))
 
 
 def tell(result: fa.RegistrationResult, json_path: str | None) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -15,20 +16,22 @@ import fieldalign as fa
 from ..clouds.files import writer_of
 from ..errors import ArgumentError
 from ..motions import as_rigid
-from ..whole_file import replacing
 from .executors import bar, chosen_executor, executor_options
+from .files import check_folder, write_text
 
 
 @click.command("assemble")
 @click.argument("scans", type=click.Path(), nargs=-1, required=True)
 @click.option("--output", type=click.Path(), help="Write the fused cloud; of other components to NAME_2.ply, ...")
 @click.option("--poses-to", type=click.Path(), help="Write {scan: world_from_scan} as JSON.")
-@click.option("--json", "json_path", type=click.Path(), help="Write everything that was found as JSON.")
+@click.option("--json", "json_path", type=click.Path(allow_dash=True),
+              help="Write everything that was found as JSON; - for stdout.")
 @click.option("--moved", type=click.Path(), help="Write every placed scan, whole and moved, into this folder.")
 @click.option("--poses", type=click.Path(), help="Poses that are known: JSON {scan: 4 x 4}, as --poses-to writes them.")
 @click.option("--sigma", type=(float, float), metavar="DEGREES LENGTH", help="How well --poses are known.")
 @click.option("--fixed", multiple=True, metavar="SCAN", help="A scan of --poses that is not to move.")
 @click.option("--ordered", is_flag=True, help="Successive scans are neighbours.")
+@click.option("--sensor-at-origin", is_flag=True, help="Each scan is in the frame of its own sensor.")
 @click.option("--dof", type=click.Choice(["levelled", "planar", "translation"]), help="What the poses may differ by.")
 @executor_options
 def command(
@@ -41,6 +44,7 @@ def command(
     sigma: tuple[float, float] | None,
     fixed: tuple[str, ...],
     ordered: bool,
+    sensor_at_origin: bool,
     dof: str | None,
     run_folder: str | None,
     workers: int | None,
@@ -53,23 +57,28 @@ def command(
     """
     if output is not None:
         writer_of(output)
+    check_folder(output, poses_to, json_path)
+    places = None if moved is None else _places(Path(moved), scans)
     known = None if poses is None else _read_poses(poses, scans)
     with bar() as progress:
         found = fa.assemble(
             list(scans), poses=known, pose_sigma=sigma, fixed=[_index(name, scans) for name in fixed], ordered=ordered,
-            dof=dof, executor=chosen_executor(workers, dask), run_folder=run_folder, progress=progress, seed=seed,
+            sensor_at_origin=sensor_at_origin, dof=dof, executor=chosen_executor(workers, dask), run_folder=run_folder,
+            progress=progress, seed=seed,
         )
-    if poses_to is not None:
-        placed = {scan: None if T is None else T.tolist() for scan, T in zip(scans, found.poses, strict=True)}
-        _write(poses_to, json.dumps(placed, indent=1))
-    if json_path is not None:
-        _write(json_path, json.dumps({"scans": list(scans)} | found.to_dict(), indent=1))
+    placed = {scan: None if T is None else T.tolist() for scan, T in zip(scans, found.poses, strict=True)}
+    write_text(poses_to, json.dumps(placed, indent=1))
+    everything = json.dumps({"scans": list(scans)} | found.to_dict(), indent=1)
+    write_text(json_path, everything)
     if output is not None:
         for number, model in enumerate(found.models, 1):
             fa.write_cloud(_numbered(output, number), model)
-    if moved is not None:
-        _write_moved(Path(moved), scans, found)
-    _tell(scans, found)
+    if places is not None:
+        _write_moved(places, scans, found)
+    if json_path == "-":
+        click.echo(everything)
+    else:
+        _tell(scans, found)
     return 0 if len(found.components) == 1 and not found.left_out else 3
 
 
@@ -79,8 +88,9 @@ def _read_poses(path: str, scans: Sequence[str]) -> list[Any]:
         given = json.loads(Path(path).read_text())
     except (OSError, ValueError) as error:
         raise ArgumentError(f"poses must be JSON, {{scan: 4 x 4}}, but {path} is not: {error}") from error
-    unknown = sorted(set(given) - set(scans))
-    if unknown:
+    if not isinstance(given, dict):
+        raise ArgumentError(f"poses must be JSON, {{scan: 4 x 4}}, but {path} holds no such object")
+    if unknown := sorted(set(given) - set(scans)):
         raise ArgumentError(f"poses name scans that are not there, the first is {unknown[0]!r}")
     return [None if given.get(scan) is None else as_rigid(given[scan], f"the pose of {scan}") for scan in scans]
 
@@ -96,21 +106,23 @@ def _numbered(path: str, number: int) -> str:
     return path if number == 1 else str(file.with_name(f"{file.stem}_{number}{file.suffix}"))
 
 
-def _write(path: str, text: str) -> None:
-    try:
-        with replacing(path) as unfinished:
-            unfinished.write_text(text)
-    except OSError as error:
-        raise ArgumentError(f"{path} cannot be written: {error.strerror or error}") from error
+def _places(folder: Path, scans: Sequence[str]) -> dict[str, tuple[Path, Path]]:
+    """The folder, and within it where each scan goes: as it lies below the folder that holds them all."""
+    files = [Path(scan).absolute() for scan in scans]
+    common = Path(os.path.commonpath([file.parent for file in files]))
+    for scan in scans:
+        writer_of(scan)
+    return {scan: (folder, file.relative_to(common)) for scan, file in zip(scans, files, strict=True)}
 
 
-def _write_moved(folder: Path, scans: Sequence[str], found: fa.Assembly) -> None:
+def _write_moved(places: dict[str, tuple[Path, Path]], scans: Sequence[str], found: fa.Assembly) -> None:
     """Each placed scan with all that its file says of it, one at a time; a folder per component if there are more."""
     for number, members in enumerate(found.components, 1):
-        place = folder if len(found.components) == 1 else folder / f"component_{number}"
-        place.mkdir(parents=True, exist_ok=True)
         for k in members:
-            fa.write_cloud(place / Path(scans[k]).name, fa.read_cloud(scans[k]).transformed(np.asarray(found.poses[k])))
+            folder, below = places[scans[k]]
+            place = (folder if len(found.components) == 1 else folder / f"component_{number}") / below
+            place.parent.mkdir(parents=True, exist_ok=True)
+            fa.write_cloud(place, fa.read_cloud(scans[k]).transformed(np.asarray(found.poses[k])))
 
 
 def _tell(scans: Sequence[str], found: fa.Assembly) -> None:

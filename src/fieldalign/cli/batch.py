@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,8 +16,8 @@ import fieldalign as fa
 
 from ..errors import ArgumentError
 from ..motions import Matrix
-from ..whole_file import replacing
 from .executors import bar, chosen_executor, executor_options
+from .files import check_folder, write_text
 from .poses import read_pose
 
 _SHOWN = 10  # failures that are told
@@ -54,8 +55,7 @@ def command(
     Exit status 0: all are accepted; 3: some are not.
     """
     rows = read_rows(Path(pairs))
-    for path in (output, json_path):
-        _check_folder(path)
+    check_folder(output, json_path)
     folder = Path(pairs).parent
     given = [(str(folder / row.source), str(folder / row.target), row.init) for row in rows]
     with bar() as tell:
@@ -63,14 +63,12 @@ def command(
             given, executor=chosen_executor(workers, dask), run_folder=run_folder, seed=seed,
             progress=lambda finished, of: tell("registering", finished, of),
         )
-    if output is not None:
-        _write(output, lambda path: _write_csv(path, rows, results))
     plain = json.dumps([result.to_dict() for result in results], indent=1)
+    write_text(output, _csv(rows, results))
+    write_text(json_path, plain)
     if json_path == "-":
         click.echo(plain)
     else:
-        if json_path is not None:
-            _write(json_path, lambda path: path.write_text(plain))
         _print(results)
     return 0 if all(result.accepted for result in results) else 3
 
@@ -100,27 +98,14 @@ def _row(row: dict[str, Any], path: Path, line: int) -> Row:
     return Row(source, target, read_pose(text, f"{path}, line {line}: init") if init else None)
 
 
-def _check_folder(path: str | None) -> None:
-    """Raises before any work where a file cannot be written after it."""
-    if path is not None and path != "-" and not Path(path).absolute().parent.is_dir():
-        raise ArgumentError(f"{path} cannot be written: there is no folder {Path(path).parent}")
-
-
-def _write(path: str, write: Callable[[Path], Any]) -> None:
-    try:
-        with replacing(path) as unfinished:
-            write(unfinished)
-    except OSError as error:
-        raise ArgumentError(f"{path} cannot be written: {error.strerror or error}") from error
-
-
-def _write_csv(path: Path, rows: Sequence[Row], results: Sequence[fa.PairResult]) -> None:
-    with open(path, "w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(_COLUMNS)
-        for row, result in zip(rows, results, strict=True):
-            writer.writerow([row.source, row.target, str(result.accepted).lower(), result.reason.value,
-                             *_numbers(result), result.error or ""])
+def _csv(rows: Sequence[Row], results: Sequence[fa.PairResult]) -> str:
+    file = io.StringIO()
+    writer = csv.writer(file)
+    writer.writerow(_COLUMNS)
+    for row, result in zip(rows, results, strict=True):
+        writer.writerow([row.source, row.target, str(result.accepted).lower(), result.reason.value,
+                         *_numbers(result), result.error or ""])
+    return file.getvalue()
 
 
 def _numbers(result: fa.PairResult) -> list[str]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import fieldalign as fa
 
 from ..clouds.files import writer_of
@@ -9,6 +11,7 @@ from ..errors import ArgumentError
 from ..fields import DistanceField, MeshField, spread_over
 from ..fields.files import check_mesh_path, is_mesh_path, write_mesh
 from ..motions import Matrix, apply
+from ..whole_file import replacing
 
 Shape = fa.PointCloud | DistanceField
 
@@ -25,6 +28,24 @@ def check_output(path: str | None, source: Shape | None = None) -> None:
         writer_of(path)
     else:
         raise ArgumentError(f"{path} cannot be written: the source must be points or triangles, but is a volume")
+
+
+def check_folder(*paths: str | None) -> None:
+    """Raises before any work where a file cannot be written after it."""
+    for path in paths:
+        if path is not None and path != "-" and not Path(path).absolute().parent.is_dir():
+            raise ArgumentError(f"{path} cannot be written: there is no folder {Path(path).parent}")
+
+
+def write_text(path: str | None, text: str) -> None:
+    """Writes a file, whole or not at all; nothing for None and for "-", which is stdout."""
+    if path is None or path == "-":
+        return
+    try:
+        with replacing(path) as unfinished:
+            unfinished.write_text(text, encoding="utf-8", newline="")
+    except OSError as error:
+        raise ArgumentError(f"{path} cannot be written: {error.strerror or error}") from error
 
 
 def check_picture(path: str | None) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..alignment.agreement import Agreement, Apart, both_ways, mutual_score
 from ..fields.protocol import Floats
-from ..motions import apply, inverse, reach_of
+from ..motions import reach_of
 from ..result import RegistrationResult
 from ..verdict import MIN_MARGIN, Evidence, freedoms
 from .pair import Pair
@@ -90,7 +90,7 @@ def _result(
         agreeing=float(np.sqrt(there.purity * back.purity)[0]),
         margin=margin,
         searched=contest.searched,
-        seen_through=_seen_through(pair, T),
+        seen_through=pair.seen_through(T),
         hold=float(known.hold[0]),
         off=reach_of(refined.steps[-1].increment, last.extent) / pair.voxel,
     )
@@ -116,11 +116,3 @@ def _result(
     )
 
 
-def _seen_through(pair: Pair, T: Floats) -> float | None:
-    """The larger share of one cloud's surface that the other's sensor looked through; None where no sensor is known."""
-    shares = []
-    for seen, by, motion in ((pair.source, pair.target, T), (pair.target, pair.source, inverse(T))):
-        if by.sight is not None:
-            surface = seen.surface(pair.voxel)
-            shares.append(by.sight.looked_through(apply(motion, surface.places + surface.origin), pair.voxel).mean())
-    return max(map(float, shares), default=None)

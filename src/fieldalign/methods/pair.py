@@ -93,6 +93,17 @@ class Pair:
             whole = inverse(from_moving) @ growth(1 / grown) @ inverse(G) @ inverse(to_held)
         return whole @ growth(self.source.factor)
 
+    def seen_through(self, T: Floats) -> float | None:
+        """The larger share of one cloud's surface that the other's sensor looked through, where the source is moved by
+        T (4, 4); None where no sensor is known."""
+        shares = []
+        for seen, by, motion in ((self.source, self.target, T), (self.target, self.source, inverse(T))):
+            if by.sight is not None:
+                surface = seen.surface(self.voxel)
+                places = apply(motion, surface.places + surface.origin)
+                shares.append(float(by.sight.looked_through(places, self.voxel).mean()))
+        return max(shares, default=None)
+
     @property
     def guessed_pose(self) -> Floats | None:
         """The guess between the surfaces' origins."""

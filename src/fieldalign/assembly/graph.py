@@ -1,0 +1,177 @@
+"""What was found of pairs of scans, whom of them to believe, and which scans belong together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..fields.protocol import Floats
+from .blame import blamed
+from .consensus import Consensus, consensus
+from .pair_result import PairResult
+from .pose_graph import Edge
+from .world import Given
+
+_CLEAR = 0.003  # share of a surface that a sensor looked through: less in a static scene, more where places look alike
+_AGREE = 1.5    # more than so many uncertain pairs that agree join what they lie between, unclear ones count less
+_CHANCE = 0.1   # what it says for a pose that nothing was looked through, to what it says against if something was
+_CLOSER = 2.0   # by so much the margin may fall short there
+
+
+class Graph:
+    """All that was found of pairs, and what follows from it."""
+
+    def __init__(self, lengths: dict[int, tuple[float, float]], count: int, seed: int) -> None:
+        self._lengths, self._count, self._seed = lengths, count, seed
+        self.unit = float(np.median([voxel for voxel, _ in lengths.values()])) if lengths else 1.0
+        self.results: dict[tuple[int, int], PairResult] = {}
+        self._given_up: set[tuple[int, int]] = set()
+        self._consensus: Consensus | None = None
+        self.component: NDArray[np.int64] = np.arange(count)
+        self.components: list[list[int]] = []
+
+    def add(self, results: dict[tuple[int, int], PairResult]) -> None:
+        """Takes the results of pairs (i, j), and decides anew whom to believe."""
+        self.results |= results
+        self.pairs = [pair for pair, r in self.results.items() if usable(r) and pair not in self._given_up]
+        if not self.pairs:
+            return
+        self.edges = [_edge_of(*pair, self.results[pair]) for pair in self.pairs]
+        sizes = [(self._lengths[i], self._lengths[j]) for i, j in self.pairs]
+        voxels = np.array([max(a[0], b[0]) for a, b in sizes])
+        extents = np.array([min(a[1], b[1]) for a, b in sizes])
+        self._consensus = consensus(self._count, self.edges, voxels, extents, self._seed)
+        self.component = self._joined()
+        numbers, sizes_of = np.unique(self.component, return_counts=True)
+        self.components = sorted(
+            (np.flatnonzero(self.component == c).tolist() for c in numbers[sizes_of > 1]),
+            key=lambda members: (-len(members), members),
+        )
+
+    def nearby(self, count: int) -> dict[int, list[int]]:
+        """For each placed scan those later ones of its component that no pair was tried with, but that lie near enough
+        to overlap, of either's nearest few."""
+        near: dict[int, list[int]] = {}
+        for members in self.components:
+            places = self.poses[members, :3, 3]
+            reach = np.array([self._lengths[k][1] / 2 for k in members])
+            away = np.linalg.norm(places[:, None] - places, axis=2)
+            rank = np.argsort(np.argsort(away, axis=1, kind="stable"), axis=1)  # 0: the scan itself
+            may = (np.minimum(rank, rank.T) <= count) & (away < np.minimum(reach, reach[:, None]))
+            for row, i in enumerate(members):
+                chosen = [members[k] for k in np.flatnonzero(may[row]) if members[k] > i]
+                if chosen := [j for j in chosen if (i, j) not in self.results]:
+                    near[i] = chosen
+        return near
+
+    def check(self, seen: Mapping[tuple[int, int], tuple[float, float]]) -> bool:
+        """Gives up the edges that lay scans where sensors looked through them; whether there were any.
+
+        seen: of pairs (i, j) that were not tried, at the poses: the share of surface that lies on the other's, and the
+        share that was looked through.
+        """
+        if self._consensus is None:
+            return False
+        votes = [(e.i, e.j, -clarity(self.results[e.i, e.j])) for e, ok in self._judged() if ok]
+        for (i, j), (on, through) in seen.items():
+            clear = clarity_of(through)
+            votes.append((i, j, on * (1 - clear - _CHANCE * clear)))
+        guilty = blamed(self._consensus, votes, self._consensus.strength)
+        self._given_up |= {self.pairs[k] for k in guilty}
+        if guilty:
+            self.add({})
+        return bool(guilty)
+
+    @property
+    def poses(self) -> Floats:
+        """The poses (n, 4, 4) along the tree that is believed."""
+        return np.tile(np.eye(4), (self._count, 1, 1)) if self._consensus is None else self._consensus.poses
+
+    def believed(self, members: Sequence[int]) -> list[Edge]:
+        """The edges between some scans that the others do not contradict."""
+        inside = set(members)
+        return [e for e, ok in self._judged() if ok and e.i in inside and e.j in inside]
+
+    def guesses(self) -> Given:
+        """The poses, as a guess for pairs within a component."""
+        return Given(list(self.poses), None, (), is_rough=False)
+
+    def told(self, believed: bool) -> list[tuple[int, int, PairResult]]:
+        """The pairs that are believed, or not."""
+        return [(e.i, e.j, self.results[e.i, e.j]) for e, ok in self._judged() if ok == believed]
+
+    def reasons_of(self, scans: Iterable[int]) -> dict[int, str]:
+        """Why scans are in no component."""
+        return {k: self._reason_of(k) for k in scans}
+
+    def _judged(self) -> Iterable[tuple[Edge, bool]]:
+        if self._consensus is None:
+            return []
+        same = [self.component[e.i] == self.component[e.j] for e in self.edges]
+        return zip(self.edges, self._consensus.believed & np.array(same), strict=True)
+
+    def _joined(self) -> NDArray[np.int64]:
+        """The component (n,) of each scan. One edge joins two scans if it is certain; others, as along a street that
+        holds a pose in part only, join where at least two agree."""
+        assert self._consensus is not None
+        label = np.arange(self._count)
+        weak: list[tuple[Edge, float]] = []
+        for edge, ok in zip(self.edges, self._consensus.believed, strict=True):
+            result = self.results[edge.i, edge.j]
+            if ok and is_certain(result):
+                label[label == label[edge.j]] = label[edge.i]
+            elif ok:
+                weak.append((edge, clarity(result)))
+        while True:
+            between: dict[tuple[int, int], float] = {}
+            for edge, clear in weak:
+                a, b = sorted((int(label[edge.i]), int(label[edge.j])))
+                between[a, b] = between.get((a, b), 0) + clear * (a != b)
+            joined = [pair for pair, number in between.items() if number > _AGREE]
+            if not joined:
+                return label
+            label[label == joined[0][1]] = joined[0][0]
+
+    def _reason_of(self, scan: int) -> str:
+        asked = [(r.evidence.strength if r.evidence else 0.0, r) for pair, r in self.results.items() if scan in pair]
+        if not asked:
+            return "no other scan looks like it: no pair was worth a registration"
+        if any(result.accepted for _, result in asked):
+            return "the pairs that were accepted with it are contradicted by the others"
+        best = max(asked, key=lambda pair: pair[0])[1]
+        return f"none of {len(asked)} registrations was accepted; the best: {best.verdict}"
+
+
+def is_certain(result: PairResult) -> bool:
+    """Whether a pair alone joins two scans: it is accepted, and no sensor that is known looked through the other's
+    surface, not even through as much as furniture that was moved."""
+    return result.accepted and (result.evidence is None or (result.evidence.seen_through or 0.0) <= _CLEAR)
+
+
+def clarity(result: PairResult) -> float:
+    """1 where no sensor that is known looked through the other's surface, less where one did."""
+    return clarity_of(0.0 if result.evidence is None else result.evidence.seen_through or 0.0)
+
+
+def clarity_of(seen_through: float) -> float:
+    """The same of the share of a surface that was looked through."""
+    return 1 / (1 + (seen_through / _CLEAR) ** 2)
+
+
+def usable(result: PairResult) -> bool:
+    """Whether a pair says something of its poses: it is accepted, or would be if its pose were held on all sides, and,
+    where a sensor is known and did not look through the other's surface, if other poses agreed somewhat less."""
+    if result.accepted or result.evidence is None:
+        return result.accepted
+    lenient = replace(result.evidence, hold=1.0)
+    if lenient.seen_through is not None and lenient.seen_through <= _CLEAR:
+        lenient = replace(lenient, margin=_CLOSER * lenient.margin)
+    return lenient.reason.accepts
+
+
+def _edge_of(i: int, j: int, result: PairResult) -> Edge:
+    strength = (result.evidence.strength if result.evidence else 1.0) * clarity(result)
+    return Edge(i, j, result.T_target_source, result.information, result.reference_point, max(strength, 1e-6))
