@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import sys
-from pathlib import Path
 from typing import Any, Protocol
 
 import click
@@ -19,12 +18,6 @@ class Told(Protocol):
     """What can be told as JSON: a RegistrationResult, a Deviation, an Evaluation."""
 
     def to_dict(self) -> dict[str, Any]: ...  # noqa: D102
-
-
-def check_json(path: str | None) -> None:
-    """Raises where JSON cannot be written to a path."""
-    if path is not None and not Path(path).absolute().parent.is_dir():
-        raise ArgumentError(f"{path} cannot be written: there is no folder {Path(path).parent}")
 
 
 def write_json(result: Told, path: str | None) -> None:

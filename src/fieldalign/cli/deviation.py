@@ -11,8 +11,8 @@ import fieldalign as fa
 from ..clouds.files import writer_of
 from ..errors import ArgumentError
 from ..fields.files import read_field
-from .answers import as_json, check_json, write_json
-from .files import check_picture
+from .answers import as_json, write_json
+from .files import check_folder, check_picture
 from .poses import read_pose
 from .progress import stages
 
@@ -72,5 +72,5 @@ def _check_outputs(output: str | None, csv: str | None, picture: str | None, jso
             writer_of(path)
     if csv is not None and Path(csv).suffix.lower() != ".csv":
         raise ArgumentError(f"--csv must end in .csv, but is {csv!r}")
-    check_json(json_path)
+    check_folder(json_path)
     check_picture(picture)

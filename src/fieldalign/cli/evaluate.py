@@ -13,8 +13,8 @@ from ..evaluation.relative import UNITS
 from ..motions import inverse
 from ..odometry.sequences.kitti import read_calibration
 from ..odometry.trajectory_files import FORMATS, read_trajectory
-from .answers import as_json, check_json, write_json
-from .files import check_picture
+from .answers import as_json, write_json
+from .files import check_folder, check_picture
 
 _FORMATS = click.Choice(["auto", *FORMATS])
 
@@ -58,7 +58,7 @@ def command(
     relative one (RPE).
     """
     check_picture(plot)
-    check_json(json_path)
+    check_folder(json_path)
     T_camera_sensor = np.eye(4) if calib is None else read_calibration(calib)
     found = read_trajectory(trajectory, form).of_sensor(T_camera_sensor)
     evaluation = evaluate(
