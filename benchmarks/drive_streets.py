@@ -75,7 +75,7 @@ class Site:
                 self._at(road, arc, side * (half + rng.uniform(1.3, 2.6)), kind, clear=0.9)
 
     def tunnel(self, road: Curve, begin: float, end: float) -> None:
-        """An arched tube, with lamps every 12 m, a cabinet every 50 m and a fan every 90 m."""
+        """An arched tube, with lamps and fans above; markers and cabinets at the walls tell how far one has come."""
         rng, half = self._rng, self.land.half + 0.8
         angle = np.linspace(0, np.pi, 13)
         arch = np.stack([half * np.cos(angle), 3.0 + 3.4 * np.sin(angle)], 1)
@@ -86,11 +86,13 @@ class Site:
         self.soup.quads(np.stack([rings[:-1, :-1], rings[1:, :-1], rings[1:, 1:], rings[:-1, 1:]], -2))
         lamp = shapes.box((-0.6, -0.12, 0), (0.6, 0.12, 0.18))
         cabinet = shapes.box((-0.6, -0.35, -0.3), (0.6, 0.35, 2.1))
+        marker = shapes.box((-0.12, -0.1, 0.6), (0.12, 0.1, 1.1))
         fan = shapes.pipe(np.array([-1.6, 0, 0.0]), np.array([1.6, 0, 0]), 0.45, 0.45, 12)
         for things, every, left, up in (
-            (lamp, 12, 3.2, 5.4), (lamp, 12, -3.2, 5.4), (cabinet, 50, half - 0.2, 0.0), (fan, 90, 0.0, 5.6)
+            (lamp, 12, 3.2, 5.4), (lamp, 12, -3.2, 5.4), (fan, 90, 0.0, 5.6), (marker, 25, half, 0.0),
+            (marker, 25, -half, 0.0), (cabinet, 50, half - 0.2, 0.0), (cabinet, 50, 0.2 - half, 0.0),
         ):  # fmt: skip
-            for arc in np.arange(begin + rng.uniform(1, 5), end, every) + rng.uniform(0, 0.15 * every):
+            for arc in np.arange(begin + rng.uniform(0, every), end, every):
                 (yaw,) = road.at(np.array([arc]))[1]
                 self.soup.quads(shapes.placed(things, *self._points(road, np.array([arc]), left, up)[0], yaw))
 

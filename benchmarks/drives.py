@@ -6,8 +6,8 @@
 
 Writes 000000.npz, ..., one for each turn of the sensor: xyz (N, 3) float32, metres, each point in the frame of the
 sensor when it was met; times (N,) float32, seconds since the turn began; stamp, seconds, when it did. And poses.npz:
-frames, stamps, world_from_lidar (n, 4, 4) at the end of each turn, world_from_lidar_start and _middle. The same seed
-makes the same files.
+frames, of (how many the whole drive has), stamps, world_from_lidar (n, 4, 4) at the end of each turn, and
+world_from_lidar_start and _middle. The same seed makes the same files.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class Drive:
         stamps = np.arange(frames) * self.sensor.period
         at = {"": 1.0, "_start": 0.0, "_middle": 0.5}
         poses = {f"world_from_lidar{k}": self.motion.poses(stamps + v * self.sensor.period) for k, v in at.items()}
-        return {"frames": np.arange(frames), "stamps": stamps} | poses
+        return {"frames": np.arange(frames), "of": self.frames, "stamps": stamps} | poses
 
 
 # ------------------------------------------------------------------------------------------------ drives
