@@ -36,7 +36,7 @@ Simulated drives with exact truth (benchmarks/drives.py): a sensor of 64 beams, 
 its own time, and both methods are given the times. Not deskewed: the same frames, and neither makes use of them. Still:
 frames without distortion. t_err and r_err: KITTI's, means over segments of 100 to 800 m, indoors of 10 to 80 m, from
 every tenth frame on. ATE: RMS, aligned by all places; RPE: RMS, from frame to frame. Each method's poses are taken for
-that moment of the sweep (start, middle, end) that suits them best. Ratio: ours over KISS-ICP's.
+that moment of the sweep (start, middle, end) at which their t_err is least. Ratio: ours over KISS-ICP's.
 """
 ABOUT_ENDURANCE = """\
 {frames} frames, to and fro over the first {lap} of the loop without distortion, each method alone in a process. Memory:

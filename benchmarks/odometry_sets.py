@@ -85,10 +85,10 @@ def drive(folder: Path, indoors: bool) -> Sequence:
 
 
 def judged(sequence: Sequence, poses: np.ndarray) -> dict:
-    """Errors of poses (n, 4, 4), taken for that moment of the sweep, of those that the truth is known at, which suits
-    them best."""
+    """Errors of poses (n, 4, 4), taken for that moment of the sweep, of those that the truth is known at, at which the
+    drift is least."""
     rows = {moment: _judged(truth, poses, sequence.lengths) for moment, truth in sequence.truths.items()}
-    moment = min(rows, key=lambda moment: rows[moment]["rpe_m"])
+    moment = min(rows, key=lambda moment: rows[moment]["t_percent"] or rows[moment]["rpe_m"])
     return {"moment": moment} | rows[moment]
 
 
