@@ -133,9 +133,16 @@ def traffic(lane: Curve, motion: Motion, land: Land, seed: int, every: float = 9
         def oncoming(times: np.ndarray, first=first) -> np.ndarray:
             return on_road(lane, land, first - pace * times, 2 * LANE, np.pi)
 
-        movers.append(Mover(shapes.car(rng), oncoming))
+        if _apart(oncoming, motion):
+            movers.append(Mover(shapes.car(rng), oncoming))
         first += rng.uniform(0.4, 1.6) * every
     return movers
+
+
+def _apart(poses: Callable[[np.ndarray], np.ndarray], motion: Motion) -> bool:
+    """Whether a car never comes so near that it would hit the sensor's, as it might where the road crosses itself."""
+    times = np.arange(0, motion.duration, 0.1)
+    return bool(np.linalg.norm((poses(times) - motion.poses(times))[:, :2, 3], axis=1).min() > 2.8)
 
 
 def on_road(lane: Curve, land: Land, arc: np.ndarray, left: float, turn: float) -> np.ndarray:
