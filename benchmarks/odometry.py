@@ -5,7 +5,8 @@
 
 Writes odometry.json (every figure), odometry.md (the tables that the docs quote) and odometry.png into the output
 folder, after each part. Real data: ../shared/data or $FIELDALIGN_DATA. The drives (benchmarks/drives.py) are made in
-/tmp/drives or --folder, one at a time, 6 GB each, and removed unless --keep says that they stay and are used again.
+/tmp/drives or --folder, one at a time, 6 GB each, and removed again; --keep leaves them, and those that are there are
+used as they are.
 Both methods get the same frames, one after the other, in one process on two cores; CPU time is of the process.
 fieldalign is told nothing, KISS-ICP the reach of the sensor. Two hours; --quick takes some minutes.
 """
@@ -44,6 +45,8 @@ MODES = {"deskewed": True, "not deskewed": False, "still": False}  # still: fram
 REACH = {"indoor": 20.0}  # metres, at which KISS-ICP drifts least there; 100 elsewhere, its default
 LONG, LAP, EVERY = 10_000, 2000, 100
 QUICK = 300  # frames of a drive
+
+_made: set[Path] = set()  # folders that were made by this run
 
 
 def reach_of(name: str) -> float:
@@ -110,6 +113,7 @@ def made(name: str, arguments: argparse.Namespace, still: bool, frames: int | No
         options = ["--still"] * still + ([] if frames == sys.maxsize else ["--frames", str(frames)])
         command = [sys.executable, str(Path(__file__).with_name("drives.py")), name, str(folder), *options]
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+        _made.add(folder)
     return drive(folder, name == "indoor").first(None if frames == sys.maxsize else frames)
 
 
@@ -127,8 +131,10 @@ def folder_of(name: str, arguments: argparse.Namespace, still: bool) -> Path:
 
 
 def remove(name: str, arguments: argparse.Namespace, still: bool) -> None:
-    if not arguments.keep:
-        shutil.rmtree(folder_of(name, arguments, still))
+    """Unless it was there before, or is to stay."""
+    folder = folder_of(name, arguments, still)
+    if folder in _made and not arguments.keep:
+        shutil.rmtree(folder)
 
 
 # ------------------------------------------------------------------------------------------------ endurance, faults
@@ -176,7 +182,7 @@ def main() -> None:
     parser.add_argument("--drives", nargs="+", choices=DRIVES, default=DRIVES, help="drives to measure")
     parser.add_argument("--quick", action="store_true", help=f"the first {QUICK} frames of the drives")
     parser.add_argument("--folder", type=Path, default=Path("/tmp/drives"), help="where the drives are made")
-    parser.add_argument("--keep", action="store_true", help="leave the drives there, and use what is there already")
+    parser.add_argument("--keep", action="store_true", help="leave the drives that are made there")
     parser.add_argument("--output", type=Path, default=Path("docs/benchmarks"))
     arguments = parser.parse_args()
     if not DATA.is_dir():

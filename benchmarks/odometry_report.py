@@ -124,10 +124,11 @@ def drives(measured: dict) -> list[str]:
 def sizes(measured: dict) -> str:
     """The drives, and what fieldalign said on them."""
     cells = []
-    for (name,), both in pairs(measured["rows"], "drive").items():
-        row = both.get(OURS) or both[PEER]
-        cells.append([name, f"{row['metres']:.0f}", row["frames"], f"{row['points'] / 1000:.0f}k"])
-    return table(["drive", "m", "frames", "points, median"], cells)
+    for (name, mode), both in pairs(measured["rows"], "drive", "mode").items():
+        row = both[OURS]
+        said = ", ".join(f"{what.lower()} {count}" for what, count in both[OURS]["said"].items() if count)
+        cells.append([name, mode, f"{row['metres']:.0f}", row["frames"], f"{row['points'] / 1000:.0f}k", said])
+    return table(["drive", "mode", "m", "frames", "points, median", "fieldalign says of so many frames"], cells)
 
 
 def endurance(measured: dict) -> list[str]:

@@ -14,7 +14,7 @@ from fieldalign.evaluation import absolute_errors, relative_errors, segment_erro
 
 KITTI = tuple(range(100, 801, 100))  # metres, of the segments
 INDOOR = tuple(range(10, 81, 10))  # of a walk of 200 m
-TAIL = 10  # frames of a path left for the picture
+PICTURED = 10  # every so many frames, for the picture
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,8 +106,8 @@ def _judged(truth: np.ndarray, poses: np.ndarray, lengths: tuple) -> dict:
         "rpe_deg": _rms(relative.rotation),
         "t_percent": segments.translation_percent if len(segments) else None,
         "r_deg_100m": segments.rotation_deg_per_100m if len(segments) else None,
-        "path": {axis: found[0][::TAIL, k, 3].tolist() for k, axis in enumerate("xyz")},
-        "true_path": {axis: found[1][::TAIL, k, 3].tolist() for k, axis in enumerate("xyz")},
+        "path": {axis: found[0][::PICTURED, k, 3].tolist() for k, axis in enumerate("xyz")},
+        "true_path": {axis: found[1][::PICTURED, k, 3].tolist() for k, axis in enumerate("xyz")},
     }
 
 
