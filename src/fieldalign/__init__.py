@@ -11,8 +11,12 @@ from .clouds.files import read_cloud, read_clouds, write_cloud
 from .clouds.thinning import thin
 from .dof import Dof
 from .errors import ArgumentError, CloudFileError, FieldalignError, FieldError, MissingExtraError, RunError
+from .evaluation import Evaluation, evaluate
 from .inspection import Deviation, deviation
 from .odometry import Odometry, OdometryResult, OdometrySettings, Tracking
+from .odometry.sequences import read_sequence
+from .odometry.trajectory import Trajectory
+from .odometry.trajectory_files import read_trajectory, write_trajectory
 from .prepare import prepare
 from .prepared import PreparedCloud
 from .register import register
@@ -30,6 +34,7 @@ __all__ = [
     "CloudFileError",
     "Deviation",
     "Dof",
+    "Evaluation",
     "Evidence",
     "FieldError",
     "FieldalignError",
@@ -46,17 +51,22 @@ __all__ = [
     "RunError",
     "Settings",
     "Tracking",
+    "Trajectory",
     "assemble",
     "deviation",
+    "evaluate",
     "fields",
     "prepare",
     "read_cloud",
     "read_clouds",
+    "read_sequence",
+    "read_trajectory",
     "register",
     "register_many",
     "thin",
     "verify",
     "write_cloud",
+    "write_trajectory",
 ]
 
 logging.getLogger(__name__).addHandler(logging.NullHandler())

@@ -59,7 +59,8 @@ def test_the_map_has_points_and_normals(plain):
 
 def test_the_trajectory_is_kept(plain, drive):
     odometry, told = plain
-    stamps, poses = odometry.trajectory
+    stamps, poses = odometry.trajectory.times, odometry.trajectory.poses
+    assert np.array_equal(odometry.trajectory.covariances[5], told[5][1].covariance)
     assert np.array_equal(poses, np.stack([pose for pose, _ in told.values()]))
     assert np.allclose(np.diff(stamps), PERIOD)
     middle = (drive.scan(0)[1].min() + drive.scan(0)[1].max()) / 2
@@ -115,9 +116,9 @@ def test_the_unit_does_not_matter(drive, plain):
 
 def test_the_same_bits_beside_other_work(drive, plain):
     with ThreadPoolExecutor(3) as pool:
-        runs = list(pool.map(lambda _: run(drive, range(CYCLE))[0].trajectory[1], range(3)))
+        runs = list(pool.map(lambda _: run(drive, range(CYCLE))[0].trajectory.poses, range(3)))
     for poses in runs:
-        assert np.array_equal(poses, plain[0].trajectory[1][:CYCLE])
+        assert np.array_equal(poses, plain[0].trajectory.poses[:CYCLE])
 
 
 def test_clouds_arrays_and_float64_are_one(drive):
@@ -221,6 +222,34 @@ def test_scans_without_points_at_first(drive, off):
     assert off(told[29][0], pose)[0] < 0.03
 
 
+@pytest.mark.parametrize("stamped", [False, True])
+def test_a_scan_that_is_missing(drive, off, stamped):
+    odometry = fa.Odometry()
+    for k in range(40):
+        scan = (None, None) if k in (0, 30) else drive.scan(k)
+        pose = odometry.step(*scan, stamp=PERIOD * k if stamped else None)
+    said = [result.reason for result in odometry.results]
+    assert [said[k] for k in (0, 1, 30)] == [Tracking.MISSING, Tracking.FIRST, Tracking.MISSING]
+    assert set(said[2:30] + said[31:]) == {Tracking.TRACKED}
+    result, before = odometry.results[30], odometry.results[29]
+    assert not result.tracked
+    assert result.covariance[3, 3] > before.covariance[3, 3]
+    truth = [drive.pose_at(PERIOD * (k if stamped else k + 0.5)) for k in (30, 39)]
+    world = np.linalg.inv(drive.pose_at(1.5 * PERIOD))  # the middle of the first scan
+    assert off(result.pose, world @ truth[0])[0] < 0.06  # the prediction
+    assert off(pose, world @ truth[1])[0] < 0.06
+    assert len(odometry.trajectory) == 40
+
+
+def test_a_drive_without_any_scan():
+    odometry = fa.Odometry()
+    for stamp in (5.0, 5.1):
+        assert np.array_equal(odometry.step(None, None, stamp), np.eye(4))
+    assert odometry.last.reason is Tracking.MISSING
+    assert odometry.last.stamp == pytest.approx(5.1)
+    assert odometry.trajectory.covariances.shape == (2, 6, 6)
+
+
 def sector(points, times):
     angle = np.arctan2(points[:, 1], points[:, 0])
     kept = (angle > 0.2) & (angle < 0.2 + 0.2 * np.pi)
@@ -258,7 +287,7 @@ def test_a_clock_that_jumps(drive, off, jump):
     assert told[30][1].reason is Tracking.CLOCK_JUMPED
     assert {told[k][1].reason for k in range(31, 40)} == {Tracking.TRACKED}
     assert off(told[39][0], drive.pose(39))[0] < 0.04
-    assert (np.diff(odometry.stamps) > 0).all()
+    assert (np.diff(odometry.trajectory.times) > 0).all()
 
 
 def test_a_standstill(drive):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -17,6 +19,7 @@ from .result import OdometryResult
 from .scan import Scan, Sweep, sweep_of, thin_scan
 from .settings import OdometrySettings
 from .tracker import Placed, Tracker
+from .trajectory import Trajectory
 
 
 class Odometry:
@@ -25,24 +28,30 @@ class Odometry:
     settings: an OdometrySettings, of which nothing has to be chosen. deskew: whether points are carried to one moment,
     where their times are known.
 
-    last: what is known of the latest pose, an OdometryResult; None before the first step. stamps, poses: of all steps
-    so far, each pose (4, 4).
+    results: what is known of the pose of each step so far, OdometryResults. last: the latest; None before the first.
     """
 
     def __init__(self, settings: OdometrySettings | None = None, *, deskew: bool = True) -> None:
         if not isinstance(settings, OdometrySettings | None):
             raise ArgumentError(f"settings must be an OdometrySettings or None, but is {settings!r}")
         self.settings, self.deskew = settings or OdometrySettings(), bool(deskew)
-        self.last: OdometryResult | None = None
-        self.stamps: list[float] = []
-        self.poses: list[Floats] = []
-        self._pace = Pace()
+        self.results: list[OdometryResult] = []
+        self._pace, self._ahead = Pace(), 0.0  # seconds from a sweep's stamp to its middle
         self._tracker: Tracker | None = None
 
     @property
-    def trajectory(self) -> tuple[Floats, Floats]:
-        """The stamps (n,) and the poses (n, 4, 4) so far."""
-        return np.array(self.stamps), np.array(self.poses).reshape(-1, 4, 4)
+    def last(self) -> OdometryResult | None:
+        """What is known of the latest pose."""
+        return self.results[-1] if self.results else None
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """The stamps, poses and covariances so far; they are worked out here."""
+        steps, n = self.results, len(self.results)
+        return Trajectory(
+            np.array([step.stamp for step in steps]), np.reshape([step.pose for step in steps], (n, 4, 4)),
+            np.reshape([step.covariance for step in steps], (n, 6, 6)),
+        )
 
     @property
     def map(self) -> PointCloud:
@@ -50,11 +59,12 @@ class Odometry:
         return PointCloud(np.zeros((0, 3))) if self._tracker is None else self._tracker.map.cloud()
 
     def step(
-        self, cloud: PointCloud | ArrayLike, times: ArrayLike | None = None, stamp: float | None = None
+        self, cloud: PointCloud | ArrayLike | None, times: ArrayLike | None = None, stamp: float | None = None
     ) -> Floats:
         """The pose (4, 4) world_from_sensor of the next scan.
 
-        cloud: a PointCloud or points (N, 3), in the sensor's frame; rows that are not finite are missing returns.
+        cloud: a PointCloud or points (N, 3), in the sensor's frame; rows that are not finite are missing returns. None:
+            the scan is missing, and the pose is the prediction.
         times: (N,), seconds, when each point was seen (or the cloud's own): on any clock, or counted from the stamp or
             from each sweep's beginning. With them the scan is deskewed: carried to the middle of the sweep.
         stamp: seconds, the moment that the pose is for; None: the middle of the sweep.
@@ -62,11 +72,11 @@ class Odometry:
         Raises ArgumentError for arrays of a wrong shape. A scan without points raises nothing: `last` says so.
         """
         clock = Clock()
-        sweep = sweep_of(cloud, times, stamp)
+        sweep = sweep_of(cloud, times, stamp, self._ahead)
         elapsed, event = self._pace.advance(sweep.middle, sweep.span)
         tracker = self._tracker or self._begun(sweep)
         if tracker is None:
-            return self._told(Placed(np.eye(4), elapsed, Tracking.EMPTY), sweep, clock)
+            return self._told(Placed(np.eye(4), elapsed, _nothing(sweep)), sweep, clock)
         tracker.look_around(sweep)
         scan = self._thinned(sweep, tracker)
         if tracker.is_worn(scan):
@@ -74,6 +84,8 @@ class Odometry:
             scan = self._thinned(sweep, tracker)
         clock.lap("thin")
         placed = tracker.place(scan, elapsed, self._pace.interval, event)     # Gauss-Newton (eq. 11 to 16)
+        if placed.reason is Tracking.EMPTY:
+            placed = replace(placed, reason=_nothing(sweep))
         clock.lap("align")
         tracker.motion.follow(placed.pose, placed.seconds if placed.hold else None)
         if placed.reason.is_on_map:
@@ -96,13 +108,16 @@ class Odometry:
         """The pose, at the moment that was asked for, after it was written down."""
         pose, now = placed.pose, self._pace.now
         if self._tracker is not None and sweep.middle is not None and sweep.stamp not in (None, sweep.middle):
-            ahead = sweep.stamp - sweep.middle
+            self._ahead, ahead = sweep.middle - sweep.stamp, sweep.stamp - sweep.middle
             pose, now = pose @ exp_twist(ahead * self._tracker.motion.velocity), now + ahead
         found = placed.found
-        self.last = OdometryResult(
+        self.results.append(OdometryResult(
             pose, now, placed.reason, 0 if found is None else found.points, 0.0 if found is None else found.agreement,
             0 if found is None else found.iterations, clock.laps, placed.hold, placed.prediction,
-        )
-        self.stamps.append(now)
-        self.poses.append(pose)
+        ))
         return pose.copy()
+
+
+def _nothing(sweep: Sweep) -> Tracking:
+    """What is to be said of a scan with hardly any points."""
+    return Tracking.MISSING if sweep.is_missing else Tracking.EMPTY

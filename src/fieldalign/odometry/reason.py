@@ -19,6 +19,7 @@ class Tracking(Enum):
     DEGENERATE = "degenerate"
     LOST = "lost"
     EMPTY = "empty"
+    MISSING = "missing"
 
     def __str__(self) -> str:
         return _SENTENCES[self]
@@ -31,7 +32,7 @@ class Tracking(Enum):
     @property
     def is_on_map(self) -> bool:
         """Whether the scan was laid on the map, and has entered it."""
-        return self not in (Tracking.LOST, Tracking.EMPTY)
+        return self not in (Tracking.LOST, Tracking.EMPTY, Tracking.MISSING)
 
 
 _SENTENCES = {
@@ -49,4 +50,5 @@ _SENTENCES = {
     Tracking.LOST: "Lost: the scan does not lie on the map near where it was expected; the pose is the prediction, "
     "and the map was left as it is.",
     Tracking.EMPTY: "Empty: the scan has hardly any points; the pose is the prediction, and the map was left as it is.",
+    Tracking.MISSING: "Missing: there is no scan; the pose is the prediction.",
 }

@@ -33,6 +33,7 @@ class Sweep:
     middle: float | None
     span: float
     stamp: float | None
+    is_missing: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,13 +63,20 @@ class Scan:
         return _core.deskew(self.points, velocity), _core.deskew(self.sparse, velocity)
 
 
-def sweep_of(cloud: PointCloud | ArrayLike, times: ArrayLike | None, stamp: float | None) -> Sweep:
-    """The scan with its times, counted from the stamp where they are not near it. Raises ArgumentError."""
+def sweep_of(
+    cloud: PointCloud | ArrayLike | None, times: ArrayLike | None, stamp: float | None, ahead: float = 0.0
+) -> Sweep:
+    """The scan with its times, counted from the stamp where they are not near it. Raises ArgumentError.
+
+    cloud: None is a scan that is missing. ahead: seconds from the stamp to the middle, where there are no times.
+    """
+    if cloud is None:
+        return replace(_timeless(np.zeros((0, 3), np.float32), stamp, ahead), is_missing=True)
     points = cloud.points if isinstance(cloud, PointCloud) else as_points(cloud, "cloud")
     if times is None and isinstance(cloud, PointCloud):
         times = cloud.times
     if times is None or not len(points):
-        return Sweep(points, None, stamp, 0.0, stamp)
+        return _timeless(points, stamp, ahead)
     seconds = np.ascontiguousarray(times, float)
     if seconds.shape != (len(points),):
         raise ArgumentError(f"times must have shape ({len(points)},), one for each point, but has {seconds.shape}")
@@ -79,6 +87,10 @@ def sweep_of(cloud: PointCloud | ArrayLike, times: ArrayLike | None, stamp: floa
     if stamp is not None and not first - span <= stamp <= last + span:
         seconds, first, last = seconds + stamp, first + stamp, last + stamp
     return Sweep(points, seconds, (first + last) / 2, span, stamp)
+
+
+def _timeless(points: NDArray[Any], stamp: float | None, ahead: float) -> Sweep:
+    return Sweep(points, None, None if stamp is None else stamp + ahead, 0.0, stamp)
 
 
 def thin_scan(sweep: Sweep, measure: Measure, points: int, pseudo_points: int, deskew: bool) -> Scan:
