@@ -14,6 +14,7 @@ from .errors import ArgumentError, CloudFileError, FieldalignError, FieldError, 
 from .evaluation import Evaluation, evaluate
 from .inspection import Deviation, deviation
 from .odometry import Odometry, OdometryResult, OdometrySettings, Tracking
+from .odometry.loops import ClosedLoops, close_loops
 from .odometry.sequences import read_sequence
 from .odometry.trajectory import Trajectory
 from .odometry.trajectory_files import read_trajectory, write_trajectory
@@ -31,6 +32,7 @@ __all__ = [
     "PRESETS",
     "ArgumentError",
     "Assembly",
+    "ClosedLoops",
     "CloudFileError",
     "Deviation",
     "Dof",
@@ -53,6 +55,7 @@ __all__ = [
     "Tracking",
     "Trajectory",
     "assemble",
+    "close_loops",
     "deviation",
     "evaluate",
     "fields",

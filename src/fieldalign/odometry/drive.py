@@ -29,6 +29,7 @@ from ..motions import Matrix
 from ..whole_file import replacing
 from .frames_file import FrameRow, FramesWriter
 from .interruption import interruptible
+from .reason import Tracking
 from .sequences.sequence import Frame, Sequence, ahead
 from .trajectory import Trajectory
 from .trajectory_files import TrajectoryWriter
@@ -77,6 +78,12 @@ class Drive:
     stages: list[Mapping[str, float]] = field(default_factory=list)
     has_stamps: bool = True
     interrupted: bool = False
+
+    @property
+    def tracked(self) -> bool:
+        """Whether the odometry tracked every frame of the sequence."""
+        known = {reason.value for reason in Tracking if reason.is_tracked}
+        return not self.interrupted and bool(self.rows) and all(row.reason in known for row in self.rows)
 
     @property
     def trajectory(self) -> Trajectory:
@@ -194,7 +201,7 @@ def _emptied(output: str | os.PathLike[str]) -> Path:
     folder = Path(output)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for name in ("map.ply", "summary.json"):
+        for name in ("map.ply", "summary.json", "odometry_tum.txt", "trajectory.png"):
             (folder / name).unlink(missing_ok=True)
     except OSError as error:
         raise RunError(f"{folder} cannot be written: {error.strerror or error}") from error
@@ -203,11 +210,21 @@ def _emptied(output: str | os.PathLike[str]) -> Path:
 
 def _finish(drive: Drive, odometry: OdometryLike, folder: Path) -> None:
     write_cloud(folder / "map.ply", odometry.map)
+    _write_summary(folder / "summary.json", drive.to_dict())
+
+
+def add_to_summary(folder: str | os.PathLike[str], **parts: Any) -> None:
+    """Adds what was found after a drive to its summary.json. Raises RunError where it cannot be written."""
+    path = Path(folder) / "summary.json"
+    _write_summary(path, json.loads(path.read_text()) | parts)
+
+
+def _write_summary(path: Path, summary: Mapping[str, Any]) -> None:
     try:
-        with replacing(folder / "summary.json") as unfinished:
-            unfinished.write_text(json.dumps(drive.to_dict(), indent=1))
+        with replacing(path) as unfinished:
+            unfinished.write_text(json.dumps(summary, indent=1))
     except OSError as error:
-        raise RunError(f"{folder / 'summary.json'} cannot be written: {error.strerror or error}") from error
+        raise RunError(f"{path} cannot be written: {error.strerror or error}") from error
 
 
 def _median(values: Iterable[float]) -> float:

@@ -12,6 +12,7 @@ from ..clouds.cloud import PointCloud
 from ..errors import ArgumentError
 from ..fields.protocol import Floats
 from ..motions import exp_twist
+from .keyframes import Keyframe, Keyframes, fused
 from .measure import measure_of
 from .pace import Pace
 from .reason import Tracking
@@ -26,18 +27,22 @@ class Odometry:
     """Poses of a sensor that moves, scan by scan; the world is the frame of the first scan.
 
     settings: an OdometrySettings, of which nothing has to be chosen. deskew: whether points are carried to one moment,
-    where their times are known.
+    where their times are known. whole: whether the map of the whole drive is kept, not only what is around the sensor;
+    `fa.close_loops` asks for it.
 
     results: what is known of the pose of each step so far, OdometryResults. last: the latest; None before the first.
     """
 
-    def __init__(self, settings: OdometrySettings | None = None, *, deskew: bool = True) -> None:
+    def __init__(
+        self, settings: OdometrySettings | None = None, *, deskew: bool = True, whole: bool = False
+    ) -> None:
         if not isinstance(settings, OdometrySettings | None):
             raise ArgumentError(f"settings must be an OdometrySettings or None, but is {settings!r}")
         self.settings, self.deskew = settings or OdometrySettings(), bool(deskew)
         self.results: list[OdometryResult] = []
         self._pace, self._ahead = Pace(), 0.0  # seconds from a sweep's stamp to its middle
         self._tracker: Tracker | None = None
+        self._keyframes = Keyframes() if whole else None
 
     @property
     def last(self) -> OdometryResult | None:
@@ -55,8 +60,21 @@ class Odometry:
 
     @property
     def map(self) -> PointCloud:
-        """The map around the sensor: a point with its normal for each plane, in the frame of the world."""
-        return PointCloud(np.zeros((0, 3))) if self._tracker is None else self._tracker.map.cloud()
+        """The map around the sensor, or of the whole drive: a point with its normal for each voxel, in the frame of the
+        world."""
+        if self._tracker is None:
+            return PointCloud(np.zeros((0, 3)))
+        return self._tracker.map.cloud() if self._keyframes is None else fused(self.keyframes)
+
+    @property
+    def keeps_all(self) -> bool:
+        """Whether the map of the whole drive is kept."""
+        return self._keyframes is not None
+
+    @property
+    def keyframes(self) -> list[Keyframe]:
+        """What is kept of the whole drive, up to the latest step; empty where that was not asked for."""
+        return [] if self._keyframes is None else self._keyframes.with_last()
 
     def step(
         self, cloud: PointCloud | ArrayLike | None, times: ArrayLike | None = None, stamp: float | None = None
@@ -89,7 +107,10 @@ class Odometry:
         clock.lap("align")
         tracker.motion.follow(placed.pose, placed.seconds if placed.hold else None)
         if placed.reason.is_on_map:
-            tracker.map.add(*scan.at_once(tracker.motion.velocity), placed.pose)  # the target's field has grown
+            points, sparse = scan.at_once(tracker.motion.velocity)
+            tracker.map.add(points, sparse, placed.pose)                      # the target's field has grown
+            if self._keyframes is not None:
+                self._keyframes.follow(len(self.results), placed.pose, points, tracker.map)
         clock.lap("map")
         return self._told(placed, sweep, clock)
 

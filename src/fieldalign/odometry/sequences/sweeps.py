@@ -18,11 +18,12 @@ from ...motions import Matrix
 from .sequence import Frame
 
 _TURNS = {"clockwise": -1.0, "counterclockwise": 1.0}
+SWEEPS = tuple(_TURNS)
 
 
 def check_sweep(sweep: str) -> None:
     """Raises ArgumentError where it is no direction that a sensor turns in."""
-    check_one_of("sweep", sweep, tuple(_TURNS))
+    check_one_of("sweep", sweep, SWEEPS)
 
 
 def with_times(frames: Callable[[], Iterator[Frame]], sweep: str) -> Iterator[Frame]:
