@@ -57,6 +57,8 @@ class Keyframes:
         self._latest = number, pose, scan
         if self._map is local and self._gone < self.kept[-1].gone + _SPACING * local.reach:
             return
+        if len(self.kept) == 1 and self._map is not local:
+            self.kept.clear()  # the first scan's, from before it was deskewed
         keyframe, keys = self._seen(number, pose, scan, local)
         self.kept.append(keyframe)
         self._map, self._known = local, keys
