@@ -14,6 +14,7 @@ from .errors import ArgumentError, CloudFileError, FieldalignError, FieldError, 
 from .evaluation import Evaluation, evaluate
 from .inspection import Deviation, deviation
 from .odometry import Odometry, OdometryResult, OdometrySettings, Tracking
+from .odometry.localizer import Localization, Localizer
 from .odometry.loops import ClosedLoops, close_loops
 from .odometry.sequences import read_sequence
 from .odometry.trajectory import Trajectory
@@ -41,6 +42,8 @@ __all__ = [
     "FieldError",
     "FieldalignError",
     "Freedom",
+    "Localization",
+    "Localizer",
     "MissingExtraError",
     "Odometry",
     "OdometryResult",

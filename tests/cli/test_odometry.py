@@ -8,27 +8,11 @@ import pytest
 
 import fieldalign as fa
 from fieldalign.cli.executors import bar
-from fieldalign.clouds.simulated import Box, cast
 from fieldalign.motions import translation
 
 FRAMES = 14
-ROOM = (
-    Box((0, 0, -0.5), (30, 20, 1)), Box((0, 0, 5.5), (30, 20, 1)), Box((15, 0, 2), (1, 20, 8)),
-    Box((-15, 0, 2), (1, 20, 8)), Box((0, 10, 2), (30, 1, 8)), Box((0, -10, 2), (30, 1, 8)), Box((4, 4, 1), (2, 3, 2)),
-    Box((-5, -4, 1.5), (3, 2, 3)), Box((7, -5, 1), (1, 4, 2)), Box((-8, 5, 2), (2, 2, 4)),
-)
-
-
-def seen_from(place, seed):
-    azimuth, elevation = np.meshgrid(np.linspace(-np.pi, np.pi, 360, endpoint=False), np.linspace(-0.5, 0.5, 24))
-    across = np.cos(elevation)
-    beams = np.stack([across * np.cos(azimuth), across * np.sin(azimuth), np.sin(elevation)], -1).reshape(-1, 3)
-    ranges = cast(ROOM, np.tile(place, (len(beams), 1)), beams)
-    return beams * (ranges + 0.005 * np.random.default_rng(seed).normal(size=len(beams)))[:, None]
-
-
 @pytest.fixture(scope="module")
-def scans(tmp_path_factory):
+def scans(tmp_path_factory, seen_from):
     """A folder with a drive of a folder of clouds, its stamps and its truth; frame 6 of `broken` cannot be read."""
     folder = tmp_path_factory.mktemp("drives")
     poses = np.stack([translation([-3 + 0.3 * k, 0.02 * k**2, 1.5 + 0.3 * (k > 7)]) for k in range(FRAMES)])

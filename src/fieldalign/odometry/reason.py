@@ -10,6 +10,7 @@ class Tracking(Enum):
 
     FIRST = "first"
     TRACKED = "tracked"
+    FOUND = "found"
     STANDSTILL = "standstill"
     SPARSE = "sparse"
     GAP = "gap"
@@ -20,6 +21,7 @@ class Tracking(Enum):
     LOST = "lost"
     EMPTY = "empty"
     MISSING = "missing"
+    UNPLACED = "unplaced"
 
     def __str__(self) -> str:
         return _SENTENCES[self]
@@ -32,12 +34,13 @@ class Tracking(Enum):
     @property
     def is_on_map(self) -> bool:
         """Whether the scan was laid on the map, and has entered it."""
-        return self not in (Tracking.LOST, Tracking.EMPTY, Tracking.MISSING)
+        return self not in (Tracking.LOST, Tracking.EMPTY, Tracking.MISSING, Tracking.UNPLACED)
 
 
 _SENTENCES = {
     Tracking.FIRST: "The first scan: its frame is the world's.",
     Tracking.TRACKED: "Tracked: the scan lies on the map.",
+    Tracking.FOUND: "Found: the search in all of the map accepted this place, without a guess.",
     Tracking.STANDSTILL: "Tracked: the sensor stands still.",
     Tracking.SPARSE: "Tracked, though the scan has far fewer points than those before it.",
     Tracking.GAP: "Tracked after a gap: scans between the last one and this one are missing.",
@@ -51,4 +54,5 @@ _SENTENCES = {
     "and the map was left as it is.",
     Tracking.EMPTY: "Empty: the scan has hardly any points; the pose is the prediction, and the map was left as it is.",
     Tracking.MISSING: "Missing: there is no scan; the pose is the prediction.",
+    Tracking.UNPLACED: "Unplaced: the search in all of the map found no place that it could accept; there is no pose.",
 }

@@ -29,6 +29,8 @@ _USUAL_SHARE, _LEAST_SHARE = 0.67, 0.33  # of the pseudo points, that have a pla
 _PATIENCE = 5              # lost scans in a row, after which the map is begun anew
 _MEAGRE = 0.3              # of the second scan's points: a first scan with less is none to begin with
 _LOOKED = 10               # scans from one look at the range to the next
+_EXPECTED = 3.0            # voxels: nearer to the prediction, a scan on a known map is where it should be
+_USUAL = (Tracking.TRACKED, Tracking.STANDSTILL, Tracking.DEGENERATE)
 _STILL = 0.01              # voxels: a sensor that moves by less stands still
 
 
@@ -74,6 +76,19 @@ class Tracker:
         if before is not None:
             self.motion.pose, self.motion.velocity = before.motion.pose, before.motion.velocity
             self._blind = before._blind
+
+    def stand(self, local: LocalMap, scan: Scan, found: Matched) -> None:
+        """A map that is known, and where a scan was found on it."""
+        self.map, self.motion.pose, self._first, self._points = local, found.pose, scan, len(scan.points)
+        self._agreement, self._met = found.agreement, found.met / found.points
+        self._scans = 2  # the first two scans of a map that begins are another matter
+
+    def is_sure(self, placed: Placed) -> bool:
+        """Whether a scan lies on a known map as usual, and not far from where it was expected."""
+        found, seconds = placed.found, max(placed.seconds, 1e-9)
+        if found is None or placed.reason not in _USUAL or found.met < _DOUBTFUL * self._met * found.points:
+            return False
+        return self.motion.surprise(placed.pose, seconds) < _EXPECTED * self.measure.voxel
 
     def is_worn(self, scan: Scan) -> bool:
         """Whether the map is to be begun anew with a scan: too many did not lie on it, or it has but one, which is far
