@@ -37,7 +37,7 @@ bench-assemble:                   ## many scans: real sets and a heap of them be
 
 bench-odometry:                   ## real frames, simulated drives, endurance and faults, beside KISS-ICP; two hours
 	$(MAKE) VENV=$(VENV)-bench $(VENV)-bench/.installed-bench
-	$(VENV)-bench/bin/python benchmarks/odometry.py --output docs/benchmarks
+	$(VENV)-bench/bin/python benchmarks/odometry.py --loops --output docs/benchmarks
 
 wheels: $(VENV)/bin/python        ## wheels for this platform, as CI builds them
 	$(BIN)/pip install --quiet cibuildwheel

@@ -31,7 +31,7 @@ import odometry_report as report
 from any_pose import version_of
 from columns import Columns
 from odometry_faults import FAULTS, suffered
-from odometry_run import METHODS, endured, run, taken
+from odometry_run import METHODS, Record, endured, run, taken
 from odometry_sets import Sequence, drive, judged, read, real
 from paper import _processor as processor
 from scenes import DATA
@@ -96,13 +96,26 @@ def drives(arguments: argparse.Namespace) -> dict:
             sequence = made(name, arguments, still)
             points = int(np.median([len(frame.points) for frame in map(read, sequence.files[::50])]))
             for mode in [m for m in MODES if (m == "still") == still]:
-                records = run(sequence.frames(still), MODES[mode], reach_of(name))
+                records = run(sequence.frames(still), MODES[mode], reach_of(name), loops=arguments.loops)
                 for method, record in records.items():
                     row = _size(sequence, points) | judged(sequence, np.array(record.poses)) | taken(record)
+                    row |= after_loops(sequence, record)
                     columns.add(drive=name, mode=mode, method=method, **row)
-                    print(name, mode, method, in_short(row), row["moment"], row["said"], flush=True)
+                    said = row["moment"], row["said"], loops_in_short(row)
+                    print(name, mode, method, in_short(row), *said, flush=True)
             remove(name, arguments, still)
     return {"rows": columns.lists()}
+
+
+def after_loops(sequence: Sequence, record: Record) -> dict:
+    """ATE after the loops were closed, and the seconds that took; None where none were."""
+    if record.closed is None:
+        return {"loops_ate_m": None, "closing_s": None}
+    return {"loops_ate_m": judged(sequence, record.closed)["ate_m"], "closing_s": record.closing_s}
+
+
+def loops_in_short(row: dict) -> str:
+    return "" if row["loops_ate_m"] is None else f"loops: ATE {row['loops_ate_m']:.3f} m, {row['closing_s']:.1f} s"
 
 
 def made(name: str, arguments: argparse.Namespace, still: bool, frames: int | None = None) -> Sequence:
@@ -181,6 +194,7 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", choices=list(PARTS), help="parts to measure; the others are kept")
     parser.add_argument("--drives", nargs="+", choices=DRIVES, default=DRIVES, help="drives to measure")
     parser.add_argument("--quick", action="store_true", help=f"the first {QUICK} frames of the drives")
+    parser.add_argument("--loops", action="store_true", help="close the loops of the drives at their end, too")
     parser.add_argument("--folder", type=Path, default=Path("/tmp/drives"), help="where the drives are made")
     parser.add_argument("--keep", action="store_true", help="leave the drives that are made there")
     parser.add_argument("--output", type=Path, default=Path("docs/benchmarks"))

@@ -21,21 +21,29 @@ PAGE = os.sysconf("SC_PAGE_SIZE")
 class Fieldalign:
     """fieldalign, told nothing."""
 
-    def __init__(self, deskew: bool, reach: float) -> None:
-        self.odometry = fa.Odometry(deskew=deskew)
+    def __init__(self, deskew: bool, reach: float, loops: bool = False) -> None:
+        self.odometry = fa.Odometry(deskew=deskew, whole=loops)
 
     def step(self, frame: Frame) -> tuple[Callable[[], np.ndarray], Callable[[], str]]:
         """What is to be timed; and what is to be asked afterwards: how it went."""
         return lambda: self.odometry.step(frame.points, frame.times), lambda: self.odometry.last.reason.name
 
+    def closed(self) -> np.ndarray | None:
+        """The poses (n, 4, 4) after the loops were closed."""
+        return fa.close_loops(self.odometry, threads=THREADS).trajectory.poses
+
 
 class KissIcp:
     """KISS-ICP, told the reach of the sensor."""
 
-    def __init__(self, deskew: bool, reach: float) -> None:
+    def __init__(self, deskew: bool, reach: float, loops: bool = False) -> None:
         from peers.kiss_icp import Odometry
 
         self.odometry = Odometry(deskew, reach, THREADS)
+
+    def closed(self) -> np.ndarray | None:
+        """It closes no loops."""
+        return None
 
     def step(self, frame: Frame) -> tuple[Callable[[], np.ndarray], Callable[[], str]]:
         points = frame.points.astype(float)  # its own type, made beforehand
@@ -53,6 +61,8 @@ class Record:
     said: list[str] = field(default_factory=list)
     cpu_ms: list[float] = field(default_factory=list)
     wall_ms: list[float] = field(default_factory=list)
+    closed: np.ndarray | None = None  # the poses after loops were closed
+    closing_s: float = 0.0
 
     def take(self, step: Callable[[], np.ndarray], say: Callable[[], str]) -> None:
         wall, cpu = time.perf_counter(), time.process_time()
@@ -63,15 +73,22 @@ class Record:
         self.said.append(say())
 
 
-def run(frames: Iterable[Frame], deskew: bool, reach: float, methods: Iterable[str] = METHODS) -> dict[str, Record]:
-    """Every method on every frame; which goes first changes from frame to frame."""
-    running = {name: METHODS[name](deskew, reach) for name in methods}
+def run(
+    frames: Iterable[Frame], deskew: bool, reach: float, methods: Iterable[str] = METHODS, loops: bool = False
+) -> dict[str, Record]:
+    """Every method on every frame; which goes first changes from frame to frame. Loops are closed at the end."""
+    running = {name: METHODS[name](deskew, reach, loops) for name in methods}
     records = {name: Record() for name in running}
     for k, frame in enumerate(frames):
         for name in list(running) if k % 2 else reversed(running):
             answer = running[name].step(frame)
             time.sleep(REST)
             records[name].take(*answer)
+    if loops:
+        for name, method in running.items():
+            began = time.perf_counter()
+            records[name].closed = method.closed()
+            records[name].closing_s = time.perf_counter() - began
     return records
 
 

@@ -97,7 +97,8 @@ nb::dict tracked(VoxelMap& map, Scan scan, Pose4 start, Values origin, std::opti
   const Numbers s{settings};
   TrackLoss loss{s("deviations"), s("least_scale"), s("gate"), s("thickness"), s("flatness"), s("width"), is_whole};
   const TrackSchedule schedule{s.whole("steps"), s.whole("free_steps"), s("fewest"), s("first_scale"),
-                               s("still_shift"), s("still_turn"), s("largest_turn")};
+                               s("still_shift"), s("still_turn"), s("largest_turn"),
+                               s("trust"), s("arm")};
   const Vec3 about = vector_of(origin);
   std::optional<LastPose> before;
   if (last) before = LastPose{motion_of(last->data()), seconds};

@@ -133,7 +133,23 @@ struct TrackSchedule {
   double first_scale;   // of residuals, in the first step: the guess is off
   double still_shift, still_turn;  // steps that are no longer end the search
   double largest_turn;  // of a step
+  double trust;         // in the start, beside residuals of unit variance, one over a length squared; 0 for none
+  double arm;           // the lever over which turns count by what they move
 };
+
+// The sums of a step, and what is known beforehand, that the pose is near `start`: as residuals of the scan's own scale.
+inline StepSums<6> with_prior(const TrackSums& sums, const Motion& pose, const Motion& start, const TrackSchedule& schedule,
+                              double deviations) {
+  StepSums<6> both = sums.step;
+  const double deviation = sums.scale / deviations, weight = schedule.trust * deviation * deviation;
+  const Twist off = log_motion(pose * inverse(start));
+  for (int a = 0; a < 6; ++a) {
+    const double each = a < 3 ? weight * schedule.arm * schedule.arm : weight;
+    both.H[a][a] += each;
+    both.g[a] += each * off[a];
+  }
+  return both;
+}
 
 // The twists that may be told from the scan: held x, of free x; columns that are zero are not free.
 struct HeldTwists {
@@ -200,7 +216,8 @@ inline Tracked track(VoxelMap& map, std::span<const ScanPoint> scan, const Motio
     loss.least_scale = found.steps == 0 ? std::max(schedule.first_scale, least_scale) : least_scale;
     found.sums = track_sums(map, found.scan, found.cells, found.pose, origin, loss);
     ++found.steps;
-    const Twist x = step_of(found.sums.step, schedule.largest_turn, held);
+    const StepSums<6> sums = with_prior(found.sums, found.pose, start, schedule, loss.deviations);
+    const Twist x = step_of(sums, schedule.largest_turn, held);
     found.pose = motion_of(exp_twist({x[0], x[1], x[2]}, {x[3], x[4], x[5]}).data()) * found.pose;
     const double turn = x[0] * x[0] + x[1] * x[1] + x[2] * x[2], shift = x[3] * x[3] + x[4] * x[4] + x[5] * x[5];
     if (turn < schedule.still_turn * schedule.still_turn && shift < schedule.still_shift * schedule.still_shift) break;

@@ -81,7 +81,7 @@ def room(rng, n=6000):
 SETTINGS = {
     "steps": 15, "free_steps": 5, "fewest": 5, "deviations": 2.0, "thickness": 0.02, "least_scale": 0.02,
     "first_scale": 0.3, "flatness": 0.2, "width": 0.1, "gate": 1.0, "certain_gate": 0.3, "certain_flatness": 0.05,
-    "still_shift": 1e-6, "still_turn": 1e-6, "largest_turn": 0.3,
+    "still_shift": 1e-6, "still_turn": 1e-6, "largest_turn": 0.3, "trust": 0.0, "arm": 1.0,
 }
 
 
@@ -119,6 +119,24 @@ def test_one_plane_holds_three_of_six(rng):
     assert (np.abs(shares[:3]) < 1e-3 * shares[-1]).all()
     assert shares[3] > 0.1 * shares[-1]
     assert found["least_hold"] < 1e-3
+
+
+def test_a_prediction_that_is_trusted_weighs_where_little_holds(rng):
+    u, v = rng.uniform(-5, 5, (2, 20_000))
+    floor = np.c_[u, v, rng.normal(0, 0.01, 20_000)]
+    voxels = _core.VoxelMap(0.7)
+    voxels.add(scan_of(floor), np.eye(4), 1000)
+    seen = scan_of(floor[:800] + [0.05, 0, 0.1])
+
+    def found(trust):
+        settings = SETTINGS | {"trust": trust}
+        return voxels.track(seen, np.eye(4), np.zeros(3), None, 1.0, None, False, settings)
+
+    plain, mild, firm = (found(trust) for trust in (0.0, 1e3, 1e9))
+    assert abs(mild["motion"][2, 3] + 0.1) < 0.01  # the floor holds the height
+    assert np.linalg.norm(mild["motion"][:2, 3]) < 0.3 * np.linalg.norm(plain["motion"][:2, 3])
+    assert np.abs(firm["motion"] - np.eye(4)).max() < 0.01
+    assert firm["H"].max() < 1e5  # what the scan says does not count the prediction
 
 
 def test_an_unknown_place_has_no_steps():

@@ -12,8 +12,10 @@ from ..motions import exp_twist
 
 _REMEMBERED = 30  # steps, of how far off predictions were
 _UNKNOWN = 2.0    # voxels: how far off they may be at first
+_RUN = 6.0        # residuals that err together, as those of a beam do: so many count as one beside the prediction
+_KNOWN = 10       # steps, after which it is known how far predictions are off
 _LEAST = 0.1      # voxels: how far off they may be at any time
-_ARM = 10.0       # voxels: at that range a turn counts by what it moves
+ARM = 10.0        # voxels: at that range a turn counts by what it moves
 
 
 class SteadyMotion:
@@ -23,7 +25,7 @@ class SteadyMotion:
     def __init__(self, voxel: float) -> None:
         self.pose: Floats = np.eye(4)
         self.velocity: Floats = np.zeros(6)
-        self._arm, self._least = _ARM * voxel, _LEAST * voxel
+        self._arm, self._least = ARM * voxel, _LEAST * voxel
         self._square, self._seen = (_UNKNOWN * voxel) ** 2, 0
 
     def predicted(self, seconds: float) -> Floats:
@@ -47,6 +49,11 @@ class SteadyMotion:
     def spread(self) -> float:
         """How far off predictions are, root mean square (a length)."""
         return max(sqrt(self._square), self._least)
+
+    @property
+    def trust(self) -> float:
+        """How much a prediction weighs beside residuals of unit variance (1 / length squared); none at first."""
+        return _RUN / self.spread**2 if self._seen >= _KNOWN else 0.0
 
     @property
     def covariance(self) -> Floats:

@@ -16,7 +16,7 @@ from ..alignment.steps import LARGEST_TURN
 from ..fields.protocol import Floats
 from .local_map import COARSER, LocalMap
 from .measure import FEWEST, FLATNESS, WIDTH
-from .motion import SteadyMotion
+from .motion import ARM, SteadyMotion
 from .scan import Scan
 
 _STEPS, _STEPS_COARSE = 15, 30  # at most
@@ -89,7 +89,7 @@ def track(
     if is_rough:
         settings = _settings(COARSER * local.voxel, motion.spread, _STEPS_COARSE)
         start = local.coarse.track(scan.pseudo, start, origin, last, seconds, held, True, settings)["motion"]
-    settings = _settings(local.voxel, motion.spread, _STEPS)
+    settings = _settings(local.voxel, motion.spread, _STEPS) | {"trust": 0.0 if is_rough else motion.trust}
     found = local.fine.track(scan.pseudo, start, origin, last, seconds, held, False, settings)
     return Matched(origin=origin, **found)
 
@@ -108,5 +108,6 @@ def _settings(voxel: float, spread: float, steps: int) -> dict[str, float]:
         "steps": steps, "free_steps": _FREE, "still_shift": _STILL * voxel, "still_turn": _STILL / _RIM,
         "largest_turn": LARGEST_TURN, "deviations": _DEVIATIONS, "first_scale": _FIRST_SCALE * spread,
         "least_scale": thickness, "gate": gate, "fewest": FEWEST, "flatness": FLATNESS, "width": WIDTH * voxel,
+        "trust": 0.0, "arm": ARM * voxel,
         "thickness": thickness, "certain_gate": _LEAST_GATE * voxel, "certain_flatness": _CERTAIN * FLATNESS,
     }

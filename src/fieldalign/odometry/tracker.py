@@ -19,7 +19,7 @@ from .track import Matched, track
 _LEARNING = 6              # scans, from the first: little is known of the motion yet
 _MISJUDGED, _UNUSUAL = 0.3, 2.0  # voxels, and usual errors: a prediction that was off by more than both may have misled
 _AHEAD = (0, 1, 2, 4, 7, 12, 20)  # intervals: how far the sensor may have come where scans may be missing
-_AS_GOOD = 0.97            # of the best score: of places that agree nearly as well, the first is the more likely
+_AS_GOOD = 0.9             # of the best score: of places that agree nearly as well, the first is the more likely
 _LEAST_AGREEMENT = 0.3     # of the pseudo points on known surface; with less, a scan is lost
 _LEAST_MET = 0.1           # of all pseudo points
 _DOUBTFUL = 0.8            # of the usual agreement; with less, a scan may lie elsewhere
