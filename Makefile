@@ -5,7 +5,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 SOURCES := $(shell find src cpp -name '*.py' -o -name '*.hpp' -o -name '*.cpp' -o -name '*.pyi') CMakeLists.txt pyproject.toml
 
-.PHONY: demo test lint bench-paper bench-any-pose bench-verdict bench-fields bench-assemble wheels clean
+.PHONY: demo test lint bench-paper bench-any-pose bench-verdict bench-fields bench-assemble bench-odometry wheels clean
 
 demo: $(VENV)/.installed-viz      ## simulate two scans of a room, register them, compare with the truth
 	$(BIN)/fieldalign demo --output demo
@@ -34,6 +34,10 @@ bench-fields:                     ## every kind of field on each other, meshes, 
 bench-assemble:                   ## many scans: real sets and a heap of them beside the peers, a building; two hours
 	$(MAKE) VENV=$(VENV)-bench $(VENV)-bench/.installed-bench,dask
 	$(VENV)-bench/bin/python benchmarks/assemble.py --output docs/benchmarks
+
+bench-odometry:                   ## real frames, simulated drives, endurance and faults, beside KISS-ICP; two hours
+	$(MAKE) VENV=$(VENV)-bench $(VENV)-bench/.installed-bench
+	$(VENV)-bench/bin/python benchmarks/odometry.py --loops --output docs/benchmarks
 
 wheels: $(VENV)/bin/python        ## wheels for this platform, as CI builds them
 	$(BIN)/pip install --quiet cibuildwheel

@@ -20,6 +20,7 @@ using namespace fieldalign;
 namespace {
 
 using Rotation = nb::ndarray<const double, nb::shape<3, 3>, nb::c_contig, nb::device::cpu>;
+using Pose4 = nb::ndarray<const double, nb::shape<4, 4>, nb::c_contig, nb::device::cpu>;
 using Rows6 = nb::ndarray<const double, nb::shape<-1, 6>, nb::c_contig, nb::device::cpu>;
 
 Array<double> bounds_array(const Bounds& b) {
@@ -167,6 +168,16 @@ Array<double> exponential(Values twist) {
   return array(std::vector<double>(T.begin(), T.end()), {4, 4});
 }
 
+Array<double> logarithm(Pose4 T) {
+  const auto twist = log_motion(motion_of(T.data()));
+  return array(std::vector<double>(twist.begin(), twist.end()), {6});
+}
+
+Array<double> relative_twist(Pose4 A, Pose4 B) {
+  const auto twist = log_motion(inverse(motion_of(A.data())) * motion_of(B.data()));
+  return array(std::vector<double>(twist.begin(), twist.end()), {6});
+}
+
 Array<double> directions(Values value, Points<double> gradient) {
   if (value.shape(0) != gradient.shape(0)) throw std::invalid_argument("value and gradient differ in length");
   std::vector<double> unit(gradient.shape(0) * 3);
@@ -234,6 +245,7 @@ constexpr const char* kThinDoc = "Mean (m, 3), first row (m,) and number (m,) of
 
 namespace fieldalign {
 void bind_search(nb::module_& m);
+void bind_odometry(nb::module_& m);
 }
 
 NB_MODULE(_core, m) {
@@ -263,6 +275,8 @@ NB_MODULE(_core, m) {
   m.def("occupancy", &occupancy_of<double>, "points"_a.noconvert(), "most"_a, "threads"_a, kOccupancyDoc);
   m.def("transform", &transform_points, "R"_a, "t"_a, "points"_a, "R (3, 3) times each of points (n, 3), plus t (3,).");
   m.def("exp_twist", &exponential, "twist"_a, "The motion (4, 4) that a twist (w, v) (6,) generates.");
+  m.def("log_motion", &logarithm, "T"_a, "The twist (w, v) (6,) that generates a motion (4, 4).");
+  m.def("relative_twist", &relative_twist, "A"_a, "B"_a, "The twist (6,) of A^-1 B, of motions (4, 4).");
   m.def("directions", &directions, "value"_a, "gradient"_a, "Unit vectors (n, 3) away from the feet; zero without any.");
   m.def("moment_rows", &moments, "x"_a, "g"_a, "Rows (n, 6) of x cross g, then g, of x and g (n, 3).");
   m.def("direct", &direct, "J"_a, "r"_a, "The twist (6,) that minimises |J x + r|^2 over rows (n, 6), (n,).");
@@ -270,5 +284,6 @@ NB_MODULE(_core, m) {
         "The twist (6,) that minimises sum |J x + r|, and the weights (n,) it ends with.");
   m.def("information", &information, "J"_a, "w"_a, "sum w J^T J (6, 6), over rows (n, 6), (n,).");
   bind_search(m);
+  bind_odometry(m);
   m.def("count_equal", &count_equal, "points"_a, "For each point (n, 3), how many of them equal it.");
 }

@@ -31,17 +31,32 @@ inline NormalEquations normal_equations(const double* J, const double* r, const 
   return sums;
 }
 
-// x = -H^+ g: the pseudo-inverse, so that a direction without any information gets no step. Rotations and translations
-// are brought to one size first, so that the unit of length does not decide what counts as no information.
-inline Twist solve(const NormalEquations& sums) {
-  const auto& H = sums.H;
+// The length over which rotations and translations are of one size.
+inline double lever(const Square<6>& H) {
   const double turn = H[0][0] + H[1][1] + H[2][2], shift = H[3][3] + H[4][4] + H[5][5];
-  const double length = turn > 0 && shift > 0 ? std::sqrt(turn / shift) : 1;
-  const Twist scale = {1, 1, 1, length, length, length};
+  return turn > 0 && shift > 0 ? std::sqrt(turn / shift) : 1;
+}
+
+// A matrix over twists whose translations are measured in lengths of a lever.
+inline Square<6> levered(const Square<6>& H, const Twist& scale) {
   Square<6> scaled;
   for (int a = 0; a < 6; ++a)
     for (int b = 0; b < 6; ++b) scaled[a][b] = scale[a] * H[a][b] * scale[b];
-  const Eigen<6> parts = eigen<6>(scaled);
+  return scaled;
+}
+
+// The smallest eigenvalue as a share of the largest; 0 where there is none.
+inline double least_share(const Square<6>& H, double length) {
+  const auto values = eigen<6>(levered(H, {1, 1, 1, length, length, length})).values;
+  return values[5] > 0 ? values[0] / values[5] : 0;
+}
+
+// x = -H^+ g: the pseudo-inverse, so that a direction without any information gets no step. Rotations and translations
+// are brought to one size first, so that the unit of length does not decide what counts as no information.
+inline Twist solve(const NormalEquations& sums) {
+  const double length = lever(sums.H);
+  const Twist scale = {1, 1, 1, length, length, length};
+  const Eigen<6> parts = eigen<6>(levered(sums.H, scale));
   Twist x{};
   for (int k = 0; k < 6; ++k) {
     if (!(parts.values[k] > 1e-13 * parts.values[5])) continue;
@@ -49,6 +64,15 @@ inline Twist solve(const NormalEquations& sums) {
     for (int a = 0; a < 6; ++a) along += parts.vectors[a][k] * scale[a] * sums.g[a];
     for (int a = 0; a < 6; ++a) x[a] -= scale[a] * parts.vectors[a][k] * along / parts.values[k];
   }
+  return x;
+}
+
+// A step, lengthened, but turning by no more than so far.
+inline Twist limited(Twist x, double stretch, double largest_turn) {
+  for (double& part : x) part *= stretch;
+  const double turn = std::sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]);
+  if (turn > largest_turn)
+    for (double& part : x) part *= largest_turn / turn;
   return x;
 }
 

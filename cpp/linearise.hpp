@@ -6,6 +6,7 @@
 // Jacobian for a twist (w, v) on the pose's left is [x cross N, N]; for a growth of x by exp(g) it is x.N, the seventh.
 #pragma once
 
+#include <algorithm>
 #include <limits>
 #include <optional>
 
@@ -54,6 +55,12 @@ std::array<double, N> row_of(Vec3 place, Vec3 normal) {
   return row;
 }
 
+// By how much to lengthen reweighted steps: the loss bends less than its weights say (Huber, Robust Statistics, 7.8), and
+// the steps come out short by about a third. Never so long that one ends as far beyond the end.
+inline double stretch_of(double weights, double curvature) {
+  return 1 / std::clamp(curvature / std::max(weights, 1e-300), 0.6, 1.0);
+}
+
 // What one pose's pseudo points add up to for its next step.
 template <int N>
 struct StepSums {
@@ -78,6 +85,7 @@ struct StepSums {
     curvature += w * (4 / (1 + z * z) - 3);
     ++kept;
   }
+  double stretch() const { return stretch_of(weights, curvature); }
 };
 
 // What the residuals at the end tell of the pose's certainty.
@@ -94,11 +102,13 @@ struct CertaintySums {
   // differ by noise alone, does not hold a pose that slides on it.
   void add(Vec3 x, Vec3 own_normal, Vec3 mean, const Residual& found, double spread, const RobustLoss& loss) {
     const double w = weight_of(found, spread, loss) / (spread * spread);
-    const auto own = row_of<N>(x, own_normal), other = row_of<N>(mean, found.normal), row = row_of<N>(x, found.between);
-    for (int a = 0; a < N; ++a) {
-      run[a] += w * found.r * row[a];
+    const auto own = row_of<N>(x, own_normal), other = row_of<N>(mean, found.normal);
+    for (int a = 0; a < N; ++a)
       for (int b = 0; b < N; ++b) hold[a][b] += w / 2 * (own[a] * other[b] + other[a] * own[b]);
-    }
+    add_gradient(w * found.r, row_of<N>(x, found.between));
+  }
+  void add_gradient(double weighted, const std::array<double, N>& row) {
+    for (int a = 0; a < N; ++a) run[a] += weighted * row[a];
     if (++length == kRun) end_run();
   }
   void end_run() {

@@ -59,6 +59,27 @@ inline Motion operator*(const Motion& a, const Motion& b) {
   return product;
 }
 
+// Log of a motion: the twist (w, v) that generates it, turning by at most pi.
+inline std::array<double, 6> log_motion(const Motion& m) {
+  const auto& R = m.R;
+  const Vec3 axial = 0.5 * Vec3{R[7] - R[5], R[2] - R[6], R[3] - R[1]};
+  const double sine = std::sqrt(dot(axial, axial)), cosine = (R[0] + R[4] + R[8] - 1) / 2;
+  const double angle = std::atan2(sine, cosine), half = angle / 2;
+  Vec3 w = (sine > 1e-8 ? angle / sine : 1.0) * axial;
+  if (cosine <= -0.9) {  // near half a turn the axis is the direction that the symmetric part keeps
+    const Vec3 columns[3] = {{R[0] - cosine, (R[1] + R[3]) / 2, (R[2] + R[6]) / 2},
+                             {(R[1] + R[3]) / 2, R[4] - cosine, (R[5] + R[7]) / 2},
+                             {(R[2] + R[6]) / 2, (R[5] + R[7]) / 2, R[8] - cosine}};
+    const int longest = R[0] >= R[4] ? (R[0] >= R[8] ? 0 : 2) : (R[4] >= R[8] ? 1 : 2);
+    const Vec3 axis = (1 / std::sqrt(dot(columns[longest], columns[longest]))) * columns[longest];
+    w = (dot(axis, axial) >= 0 ? angle : -angle) * axis;
+  }
+  // v solves V v = t, where V is the left Jacobian of w (Barfoot, State Estimation for Robotics, 7.1.3).
+  const double share = angle < 1e-4 ? 1.0 / 12 : (1 - half / std::tan(half)) / (angle * angle);
+  const Vec3 turned = cross(w, m.t), v = m.t - 0.5 * turned + share * cross(w, turned);
+  return {w.x, w.y, w.z, v.x, v.y, v.z};
+}
+
 // Which motions D = left G right, or the inverse of that, are allowed: as a quaternion and a shift they have zeros where
 // they are not free.
 struct Freedoms {

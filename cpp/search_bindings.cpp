@@ -7,6 +7,7 @@
 #include "motion.hpp"
 #include "search.hpp"
 #include "sight.hpp"
+#include "step_arrays.hpp"
 #include "surfels.hpp"
 
 namespace fieldalign {
@@ -45,22 +46,6 @@ Pose pose_of(const double* T) {
     for (int c = 0; c < 3; ++c) pose.R[3 * r + c] = static_cast<float>(T[4 * r + c]);
   pose.t = narrow({T[3], T[7], T[11]});
   return pose;
-}
-
-constexpr std::size_t kTotals = 4;
-
-// H (b, N, N), g (b, N), and for each pose sum of weights, weighted squares, curvature and how many were kept (b, 4).
-template <int N>
-nb::tuple arrays_of(const std::vector<StepSums<N>>& sums) {
-  const std::size_t b = sums.size(), n = N;
-  std::vector<double> H, g, totals;
-  for (const StepSums<N>& s : sums) {
-    g.insert(g.end(), s.g.begin(), s.g.end());
-    for (int i = 0; i < N; ++i)
-      for (int j = 0; j < N; ++j) H.push_back(s.H[std::min(i, j)][std::max(i, j)]);
-    totals.insert(totals.end(), {s.weights, s.squares, s.curvature, static_cast<double>(s.kept)});
-  }
-  return nb::make_tuple(array(std::move(H), {b, n, n}), array(std::move(g), {b, n}), array(std::move(totals), {b, kTotals}));
 }
 
 // For each pose and each place near the grid's surface: take(pose's row, place's row, place moved, normal moved, plane).
@@ -114,13 +99,6 @@ Array<double> grid_agreement(const ClosestGrid& grid, Points<double> places, Poi
   return array(std::move(shares), {b, 3});
 }
 
-template <std::size_t N>
-Array<double> array_of(const std::array<std::array<double, N>, N>& A) {
-  std::vector<double> flat;
-  for (const auto& row : A) flat.insert(flat.end(), row.begin(), row.end());
-  return array(std::move(flat), {N, N});
-}
-
 // One pose, whose pseudo points are moved already and whose planes are known; seven freedoms, the last a growth. The scale of the residuals is their own:
 // so many standard deviations, by their median, but no finer than what is given. H, g and totals; hold; scatter; the scale.
 nb::tuple plane_sums(Points<double> x, Points<double> own_normals, Points<double> means, Points<double> normals,
@@ -162,11 +140,7 @@ auto take_steps(Matrices4 poses, nb::ndarray<const double, nb::shape<-1, 6, 6>, 
     NormalEquations sums;
     std::copy_n(g.data() + 6 * k, 6, sums.g.begin());
     for (int i = 0; i < 6; ++i) std::copy_n(H.data() + 36 * k + 6 * i, 6, sums.H[i].begin());
-    Twist x = solve(sums);
-    for (double& part : x) part *= stretch.data()[k];
-    const double turn = std::sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]);
-    if (turn > largest_turn)
-      for (double& part : x) part *= largest_turn / turn;
+    const Twist x = limited(solve(sums), stretch.data()[k], largest_turn);
     const auto E = exp_twist({x[0], x[1], x[2]}, {x[3], x[4], x[5]});
     const double* T = poses.data() + 16 * k;
     for (int r = 0; r < 4; ++r)
@@ -175,6 +149,14 @@ auto take_steps(Matrices4 poses, nb::ndarray<const double, nb::shape<-1, 6, 6>, 
     std::copy(x.begin(), x.end(), twists.begin() + static_cast<std::ptrdiff_t>(6 * k));
   }
   return std::make_pair(array(std::move(twists), {b, 6}), array(std::move(moved), {b, 4, 4}));
+}
+
+// By how much to lengthen the steps of many poses (b,).
+Array<double> stretches(nb::ndarray<const double, nb::shape<-1, kTotals>, nb::c_contig, nb::device::cpu> totals) {
+  const std::size_t b = totals.shape(0);
+  std::vector<double> found(b);
+  for (std::size_t k = 0; k < b; ++k) found[k] = stretch_of(totals.data()[kTotals * k], totals.data()[kTotals * k + 2]);
+  return array(std::move(found), {b});
 }
 
 // For each surfel, how many of the witnesses lie in its plane (n,).
@@ -284,6 +266,7 @@ void bind_search(nb::module_& m) {
   m.attr("RUN") = kRun;
   m.def("coplanar", &coplanar, "places"_a, "normals"_a, "witness_places"_a, "witness_normals"_a, "distance"_a,
         "min_cosine"_a, "threads"_a);
+  m.def("stretch", &stretches, "totals"_a);
   m.def("take_steps", &take_steps, "poses"_a, "H"_a, "g"_a, "stretch"_a, "largest_turn"_a);
 }
 

@@ -78,6 +78,22 @@ def pair(corner, motion, rng):
     return corner, apply(T, corner), T
 
 
+@pytest.fixture(scope="session")
+def winding():
+    """Makes the poses (n, 4, 4) of a drive of n frames, about a metre each, that turns, climbs and rolls a little."""
+
+    def make(seed: int, n: int, noise: float = 0.0) -> np.ndarray:
+        rng = np.random.default_rng(seed)
+        turns = np.cumsum(rng.normal(size=(n, 3)), axis=0) * [0.002, 0.002, 0.02]
+        poses = np.tile(np.eye(4), (n, 1, 1))
+        for k in range(1, n):
+            step = exp_twist(np.r_[turns[k] * 0.2, 1 + 0.1 * np.sin(k / 9), 0, 0.02 * np.cos(k / 30)])
+            poses[k] = poses[k - 1] @ step @ exp_twist(noise * rng.normal(size=6))
+        return poses
+
+    return make
+
+
 @pytest.fixture(params=["robust", "paper"])
 def register(request):
     """fa.register, by either method."""

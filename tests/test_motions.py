@@ -8,6 +8,7 @@ from fieldalign.motions import (
     apply,
     as_rigid,
     as_similar,
+    best_motion,
     exp_twist,
     growth,
     inverse,
@@ -105,6 +106,15 @@ def test_as_rigid_cleans_a_pose_with_few_digits(rng):
     T = exp_twist(rng.normal(size=6))
     cleaned = as_rigid(np.round(T, 5), "init")
     assert np.allclose(cleaned[:3, :3] @ cleaned[:3, :3].T, np.eye(3), atol=1e-14)
+
+
+def test_best_motion_is_that_of_scipy(rng):
+    places, noise = rng.normal(size=(2, 30, 3))
+    onto = places @ Rotation.random(rng=rng).as_matrix().T + [1, 2, 3] + 0.3 * noise
+    T = best_motion(places, onto)
+    expected = Rotation.align_vectors(onto - onto.mean(axis=0), places - places.mean(axis=0))[0]
+    np.testing.assert_allclose(T[:3, :3], expected.as_matrix(), atol=1e-12)
+    np.testing.assert_allclose(apply(T, places).mean(axis=0), onto.mean(axis=0), atol=1e-12)
 
 
 def test_nearest_rotation_is_never_a_reflection(rng):

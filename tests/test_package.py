@@ -9,7 +9,7 @@ import fieldalign as fa
 
 SOURCE = Path(fa.__file__).parent
 MODULES = sorted(SOURCE.rglob("*.py"))
-PEERS = {"open3d", "small_gicp", "kiss_matcher", "kiss_icp", "teaserpp_python"}
+PEERS = {"open3d", "small_gicp", "kiss_matcher", "kiss_icp", "teaserpp_python", "evo"}
 
 
 def imported(module: Path) -> set[str]:

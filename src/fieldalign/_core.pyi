@@ -1,6 +1,7 @@
 """The native core of fieldalign: what loops over points."""
 
 from collections.abc import Mapping
+from typing import Any
 
 from numpy import float32, float64, int64, uint32
 from numpy.typing import NDArray
@@ -53,6 +54,12 @@ def transform(R: Floats, t: Floats, points: Floats) -> Floats:
 
 def exp_twist(twist: Floats) -> Floats:
     """The motion (4, 4) that a twist (w, v) (6,) generates."""
+
+def log_motion(T: Floats) -> Floats:
+    """The twist (w, v) (6,) that generates a motion (4, 4), turning by at most pi."""
+
+def relative_twist(A: Floats, B: Floats) -> Floats:
+    """The twist (6,) of A^-1 B, of motions (4, 4)."""
 
 def directions(value: Floats, gradient: Floats) -> Floats:
     """Unit vectors (n, 3) away from the feet; zero where there is no gradient."""
@@ -168,5 +175,54 @@ def coplanar(
     """For each surfel (n, 3), how many of the witnesses (m, 3) lie within `distance` of its plane, their normals within
     an angle of this cosine (n,)."""
 
+def stretch(totals: Floats) -> Floats:
+    """By how much to lengthen the steps that totals (b, 4) of robust_sums belong to (b,)."""
+
 def take_steps(poses: Floats, H: Floats, g: Floats, stretch: Floats, largest_turn: float) -> tuple[Floats, Floats]:
     """Twists -stretch H^+ g (b, 6), turning by at most largest_turn, and the poses (b, 4, 4) that they lead to."""
+
+Scan = NDArray[float32]  # (n, 4): a place in the sensor's frame, and seconds from the moment of the scan's pose
+
+def thin_scan(
+    points: Points, times: Floats | None, moment: float, stride: int, voxel: float, nearest: float, farthest: float
+) -> Scan:
+    """Of every stride-th point (n, 3) the first in each voxel, between two ranges; times (n,) are counted from the
+    moment. Points that are not finite are left out."""
+
+def thin_twice(scan: Scan, voxel: float, count: int) -> tuple[Scan, Scan]:
+    """The first point of a scan in each voxel, and so many of these, evenly taken; of all, where
+    these are too few."""
+
+def deskew(scan: Scan, twist: Floats) -> Scan:
+    """Each point as seen at the moment of the pose, by a sensor that moves at a steady twist (6,) a second."""
+
+class VoxelMap:
+    """A map that grows: voxels, in each of them the plane of its points."""
+
+    def __init__(self, voxel: float) -> None: ...
+    def __len__(self) -> int: ...
+    def add(self, scan: Scan, pose: Floats, most: float) -> None:
+        """A scan seen from a pose (4, 4) enters the voxels' sums, but for voxels of `most` points, which are full."""
+    def keep_within(self, centre: Floats, radius: float) -> int:
+        """Leaves the voxels within a radius of a place (3,), and returns how many they are."""
+    def track(
+        self,
+        scan: Scan,
+        start: Floats,
+        origin: Floats,
+        last: Floats | None,
+        seconds: float,
+        held: Floats | None,
+        is_whole: bool,
+        settings: Mapping[str, float],
+    ) -> dict[str, Any]:
+        """Where pseudo points (n, 4) come to lie, from a pose (4, 4) about the origin (3,), by Gauss-Newton.
+
+        last: the pose (4, 4) about the origin, so many seconds ago: then the scan is deskewed. held: (6, 6), its
+        columns are the twists that may be told from the scan. is_whole: voxels that are no planes hold, too, and planes
+        along themselves. The answer holds motion (4, 4), H, hold and scatter (6, 6), stretch, scale, points, met (that
+        have a plane), on (that lie on it), iterations, the lever over which turns and shifts are of one size, and the
+        hold of the least held direction as a share of the best one's."""
+    def planes(self, fewest: float) -> tuple[Floats, Floats, Floats, Floats]:
+        """Means (n, 3), normals (n, 3), numbers of points (n,) and the two lesser variances (n, 2) of the cells that
+        hold so many."""

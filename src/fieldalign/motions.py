@@ -22,27 +22,14 @@ def exp_twist(twist: Matrix) -> Matrix:
 
 def log_motion(T: Matrix) -> Matrix:
     """The twist (6,) of a rigid motion (4, 4): Exp(log_motion(T)) = T, turning by at most pi."""
-    R, t = T[:3, :3], T[:3, 3]
-    axial = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / 2
-    sine, cosine = np.linalg.norm(axial), (np.trace(R) - 1) / 2
-    angle = float(np.arctan2(sine, cosine))
-    if cosine > -0.9:
-        w = axial * (angle / sine if sine > 1e-8 else 1.0)
-    else:  # near half a turn the axis is the direction that the symmetric part keeps
-        symmetric = (R + R.T) / 2 - cosine * np.eye(3)
-        axis = symmetric[np.argmax(np.diag(symmetric))]
-        axis = axis / np.linalg.norm(axis)
-        w = axis * (angle if axis @ axial >= 0 else -angle)
-    return np.concatenate([w, left_jacobian_inverse(w) @ t])
+    return _core.log_motion(np.ascontiguousarray(T, float))
 
 
 def left_jacobian_inverse(w: Matrix) -> Matrix:
-    """(3, 3): by what the rotation vector w (3,) changes when Exp(w) is turned a little on its left (Barfoot, State
-    Estimation for Robotics, 7.1.3). It is also what makes v of a twist (w, v) from the shift of its motion."""
-    K, angle = np.cross(np.eye(3), w), float(np.linalg.norm(w))
-    half = angle / 2
-    share = 1 / 12 if angle < 1e-4 else (1 - half / np.tan(half)) / angle**2
-    return np.asarray(np.eye(3) - K / 2 + share * (K @ K))
+    """(3, 3): by what the rotation vector w (3,) changes when Exp(w) is turned a little on its left; it is also what
+    makes v of a twist (w, v) from the shift of its motion (Barfoot, State Estimation for Robotics, 7.1.3)."""
+    turn = exp_twist(np.r_[w, 0.0, 0.0, 0.0])
+    return np.stack([log_motion(translation(axis) @ turn)[3:] for axis in np.eye(3)], axis=1)
 
 
 def inverse(T: Matrix) -> Matrix:
@@ -124,6 +111,16 @@ def orthonormal(T: Matrix) -> Matrix:
     rigid = T.copy()
     rigid[:3, :3] = nearest_rotation(T[:3, :3])
     return rigid
+
+
+def best_motion(places: Matrix, onto: Matrix) -> Matrix:
+    """The motion (4, 4) that lays places (n, 3) on others with the least sum of squares (Kabsch, Acta Cryst. 1976);
+    about a line that all of them lie on, it turns by anything."""
+    middle, onto_middle = places.mean(axis=0), onto.mean(axis=0)
+    T = np.eye(4)
+    T[:3, :3] = nearest_rotation(np.einsum("ni,nj->ij", onto - onto_middle, places - middle))
+    T[:3, 3] = onto_middle - T[:3, :3] @ middle
+    return T
 
 
 def quaternions_of(R: Matrix) -> Matrix:

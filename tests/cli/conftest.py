@@ -1,8 +1,16 @@
 """How the tests of the command line run it."""
 
+import numpy as np
 import pytest
 
 from fieldalign.cli import main
+from fieldalign.clouds.simulated import Box, cast
+
+ROOM = (
+    Box((0, 0, -0.5), (30, 20, 1)), Box((0, 0, 5.5), (30, 20, 1)), Box((15, 0, 2), (1, 20, 8)),
+    Box((-15, 0, 2), (1, 20, 8)), Box((0, 10, 2), (30, 1, 8)), Box((0, -10, 2), (30, 1, 8)), Box((4, 4, 1), (2, 3, 2)),
+    Box((-5, -4, 1.5), (3, 2, 3)), Box((7, -5, 1), (1, 4, 2)), Box((-8, 5, 2), (2, 2, 4)),
+)
 
 
 @pytest.fixture
@@ -21,3 +29,17 @@ def call(scans, monkeypatch, capsys):
     yield run
     for left in set(folder.rglob("*")) - before:
         left.unlink()
+
+
+@pytest.fixture(scope="session")
+def seen_from():
+    """Points (n, 3) of a room with some boxes, seen from a place in it."""
+
+    def see(place, seed):
+        azimuth, elevation = np.meshgrid(np.linspace(-np.pi, np.pi, 360, endpoint=False), np.linspace(-0.5, 0.5, 24))
+        across = np.cos(elevation)
+        beams = np.stack([across * np.cos(azimuth), across * np.sin(azimuth), np.sin(elevation)], -1).reshape(-1, 3)
+        ranges = cast(ROOM, np.tile(place, (len(beams), 1)), beams)
+        return beams * (ranges + 0.005 * np.random.default_rng(seed).normal(size=len(beams)))[:, None]
+
+    return see

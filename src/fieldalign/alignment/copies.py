@@ -6,7 +6,7 @@ import numpy as np
 
 from ..fields import PointField
 from ..fields.protocol import Floats
-from ..motions import apply, nearest_rotation
+from ..motions import apply, best_motion
 
 _ROUNDS = 20
 _MET = 1e-3  # of the distance between neighbouring points: so close, the nearest point is the point itself
@@ -27,15 +27,5 @@ def meet(held: PointField, places: Floats, pose: Floats) -> Floats | None:
         if not typical < last:
             break
         near = sample.value <= 3 * typical
-        pose, last = _motion_between(places[near], sample.foot[near]), typical
+        pose, last = best_motion(places[near], sample.foot[near]), typical
     return pose if last < _MET * spacing else None
-
-
-def _motion_between(places: Floats, onto: Floats) -> Floats:
-    """The motion that lays places (M, 3) on others with the least sum of squares."""
-    middle, onto_middle = places.mean(axis=0), onto.mean(axis=0)
-    R = nearest_rotation(np.einsum("ni,nj->ij", onto - onto_middle, places - middle))
-    T = np.eye(4)
-    T[:3, :3] = R
-    T[:3, 3] = onto_middle - R @ middle
-    return T

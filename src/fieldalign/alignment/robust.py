@@ -36,7 +36,6 @@ LEVELS = (Level(2.0, 240, 5, 24), Level(1.0, 300, 4, 12), Level(0.4, 700, 4, 8))
 _LEAST_SPREAD = 0.1   # of the typical variance: no plane is taken for more exact
 _SHARPEST = 0.3       # voxels: no coarse level weighs residuals by less
 _SCORED = 600         # surfels that a pruning goes by
-_LEAST_BEND = 0.6     # of the weights: a step is never so long that it ends as far beyond the end
 _SAME = Apart(0.9986, 1.0)  # 3 degrees and a voxel: poses that came to the same place
 _RESOLUTION = 1e-14   # of coordinates: where surfaces meet without noise, what is left of residuals is rounding
 _LEAST_SHRINKAGE = 0.3  # of the scale, from step to step: residuals that shrink more slowly count on
@@ -65,7 +64,7 @@ class GridStage:
     def step(self, poses: Floats) -> tuple[Floats, Step]:
         """A Gauss-Newton step of every pose."""
         H, g, totals = self.grid.robust_sums(self.places, self.normals, self.offsets, poses, *self.loss, self.threads)
-        twists, poses = take_steps(poses, H, g, _stretch(totals), self.allowed)
+        twists, poses = take_steps(poses, H, g, _core.stretch(totals), self.allowed)
         return poses, Step(twists[0], _rms(totals[0]), int(totals[0, 3]))
 
     def is_still(self, step: Step) -> bool:
@@ -137,7 +136,7 @@ class FieldStage:
         self.H, self.gradient, self.totals = H[0], g[0], totals[0]
         # Far from the end the scale shrinks with the residuals, and a longer step would leap over the end for ever.
         turns_back = g[0] @ self.increment > 0
-        stretch = np.ones(1) if turns_back else _stretch(totals)
+        stretch = np.ones(1) if turns_back else _core.stretch(totals)
         self.increment = np.zeros(7)
         if self.grows:
             poses = self._grown(poses, H, g, stretch)
@@ -183,14 +182,14 @@ class FieldStage:
     @property
     def curvature(self) -> Floats:
         """Derivative (7, 7) of the gradient by a twist and a growth: H, less what the loss bends."""
-        return np.asarray(self.H / _stretch(self.totals[None]))
+        return np.asarray(self.H / _core.stretch(self.totals[None]))
 
     @property
     def gradient_scatter(self) -> Floats:
         """Covariance (7, 7) of the gradient: from runs of neighbouring pseudo points, and where these are few, from the
         residuals as if each were independent."""
         runs = self.totals[3] / _core.RUN
-        independent = (self.rmse**2 + (1e-12 * self.extent) ** 2) / _stretch(self.totals[None]) ** 2 * self.H
+        independent = (self.rmse**2 + (1e-12 * self.extent) ** 2) / _core.stretch(self.totals[None]) ** 2 * self.H
         return np.asarray((runs * self.scatter + _FEW * independent) / (runs + _FEW))
 
     @property
@@ -236,12 +235,6 @@ def _spread(own: Planes, other: Planes) -> Floats:
     variance = own.thickness**2 + other.thickness**2 * np.clip(shared**2, 0.1, 10)
     typical = float(np.median(variance))
     return np.sqrt(_LEAST_SPREAD + variance / typical) if typical > 0 else np.ones(len(variance))
-
-
-def _stretch(totals: Floats) -> Floats:
-    """By how much to lengthen reweighted steps (B,): the loss bends less than its weights say (Huber, Robust
-    Statistics, 7.8), and the steps come out short by about a third."""
-    return np.asarray(1 / np.clip(totals[:, 2] / np.maximum(totals[:, 0], 1e-300), _LEAST_BEND, 1.0))
 
 
 def _rms(totals: Floats) -> float:

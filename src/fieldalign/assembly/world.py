@@ -9,7 +9,7 @@ import numpy as np
 
 from ..dof import Dof, allowed_poses
 from ..fields.protocol import Floats
-from ..motions import inverse, nearest_rotation
+from ..motions import best_motion, inverse
 from .pose_graph import Anchors
 
 _ROUGH_TURN = 0.5  # rad: of poses that are known no better, only the places are
@@ -70,14 +70,6 @@ def _world(
     rows = list(row_of.values())
     there = np.stack([np.asarray(given.poses[members[row]]) for row in rows])
     if not fixed and given.sigma is not None and given.sigma[0] > _ROUGH_TURN and len(rows) > 2:
-        return _between(poses[rows, :3, 3], there[:, :3, 3])
+        return best_motion(poses[rows, :3, 3], there[:, :3, 3])
     first = fixed[0] if fixed else rows[0]
     return np.asarray(given.poses[members[first]]) @ inverse(poses[first])
-
-
-def _between(places: Floats, onto: Floats) -> Floats:
-    """The motion (4, 4) that lays places (n, 3) on others with the least sum of squares (Kabsch, Acta Cryst. 1976)."""
-    W = np.eye(4)
-    W[:3, :3] = nearest_rotation((onto - onto.mean(axis=0)).T @ (places - places.mean(axis=0)))
-    W[:3, 3] = onto.mean(axis=0) - W[:3, :3] @ places.mean(axis=0)
-    return W

@@ -13,7 +13,7 @@ import click
 
 from ..errors import FieldalignError
 
-VERBS = ("register", "verify", "batch", "assemble", "deviation", "demo")
+VERBS = ("register", "verify", "batch", "assemble", "odometry", "localize", "evaluate", "deviation", "demo")
 
 
 class LazyVerbs(click.Group):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from typing import Any, Protocol
 
 import click
 import numpy as np
@@ -13,7 +14,13 @@ import fieldalign as fa
 from .files import write_text
 
 
-def write_json(result: fa.RegistrationResult | fa.Deviation, path: str | None) -> None:
+class Told(Protocol):
+    """What can be told as JSON: a RegistrationResult, a Deviation, an Evaluation."""
+
+    def to_dict(self) -> dict[str, Any]: ...  # noqa: D102
+
+
+def write_json(result: Told, path: str | None) -> None:
     """Writes the result to a file, whole or not at all; nothing for None and for "-", which is stdout."""
     write_text(path, as_json(result))
 
@@ -27,7 +34,7 @@ def tell(result: fa.RegistrationResult, json_path: str | None) -> int:
     return 0 if result.accepted else 3
 
 
-def as_json(result: fa.RegistrationResult | fa.Deviation) -> str:
+def as_json(result: Told) -> str:
     """The result as JSON."""
     return json.dumps(result.to_dict(), indent=1)
 

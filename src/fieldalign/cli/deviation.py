@@ -12,7 +12,7 @@ from ..clouds.files import writer_of
 from ..errors import ArgumentError
 from ..fields.files import read_field
 from .answers import as_json, write_json
-from .files import check_picture
+from .files import check_folder, check_picture
 from .poses import read_pose
 from .progress import stages
 
@@ -72,6 +72,5 @@ def _check_outputs(output: str | None, csv: str | None, picture: str | None, jso
             writer_of(path)
     if csv is not None and Path(csv).suffix.lower() != ".csv":
         raise ArgumentError(f"--csv must end in .csv, but is {csv!r}")
-    if json_path is not None and not Path(json_path).absolute().parent.is_dir():
-        raise ArgumentError(f"{json_path} cannot be written: there is no folder {Path(json_path).parent}")
+    check_folder(json_path)
     check_picture(picture)

@@ -35,18 +35,19 @@ def chosen_executor(workers: int | None, dask: str | None) -> AnyExecutor:
 
 
 @contextmanager
-def bar() -> Iterator[Callable[[str, int, int], None]]:
-    """A bar on stderr with the time that is left, for stages of work: tell(stage, finished, of). Nothing where no
-    person looks."""
+def bar() -> Iterator[Callable[[str, int, int | None], None]]:
+    """A bar on stderr with the time that is left, for stages of work: tell(stage, finished, of), where None is a number
+    that nobody knows. Nothing where no person looks."""
     shown: Any = None
 
-    def tell(stage: str, finished: int, of: int) -> None:
+    def tell(stage: str, finished: int, of: int | None) -> None:
         nonlocal shown
         if finished == 0:
             if shown is not None:
                 shown.render_finish()
             shown = click.progressbar(
-                length=of, label=stage, file=sys.stderr, hidden=not sys.stderr.isatty(), show_pos=True
+                (None for _ in ()), length=of, label=stage, file=sys.stderr, hidden=not sys.stderr.isatty(),
+                show_pos=True,
             )
             shown.render_progress()
         shown.update(finished - shown.pos)
