@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fieldalign.assembly.graph import Graph, is_certain, usable
+from fieldalign.assembly.graph import Graph, is_certain, usable, weight_of
 from fieldalign.assembly.pair_result import PairResult
 from fieldalign.motions import exp_twist, inverse
 from fieldalign.verdict import Evidence, Reason
@@ -29,16 +29,24 @@ def result_of(evidence=GOOD, T=None):
         (replace(CLEAR, seen_through=0.01), True, False),   # furniture that was moved, or a place that looks alike
         (replace(CLEAR, seen_through=0.1), False, False),
         (replace(GOOD, hold=1e-4), True, False),            # along a street
-        (replace(GOOD, margin=1.5), False, False),
+        (replace(GOOD, margin=1.5), True, False),           # which needs others that agree
+        (replace(GOOD, margin=1.4), False, False),
         (replace(CLEAR, margin=1.5), True, False),          # no sensor objects
         (replace(CLEAR, margin=1.1), False, False),
-        (replace(CLEAR, margin=1.5, seen_through=0.01), False, False),
+        (replace(CLEAR, margin=1.5, seen_through=0.01), True, False),  # and counts next to nothing
         (replace(CLEAR, margin=1.5, agreeing=0.1), False, False),
     ],
 )
 def test_what_a_pair_is_good_for(evidence, used, joins):
     assert usable(result_of(evidence)) is used
     assert is_certain(result_of(evidence)) is joins
+
+
+def test_what_is_less_sure_counts_less_where_several_must_agree():
+    assert weight_of(result_of(GOOD)) == weight_of(result_of(replace(GOOD, hold=1e-4))) == 1
+    assert weight_of(result_of(replace(GOOD, margin=1.5))) == 0.5
+    assert pytest.approx(weight_of(result_of(replace(CLEAR, margin=1.5)))) == 0.9
+    assert weight_of(result_of(replace(CLEAR, seen_through=0.02))) < 0.1
 
 
 def test_a_pair_that_failed_is_good_for_nothing():

@@ -20,7 +20,7 @@ _CLEAR = 0.003  # share of a surface that a sensor looked through: less in a sta
 _AGREE = 1.5    # more than so many uncertain pairs that agree join what they lie between, unclear ones count less
 _AS_BEFORE = 0.1  # voxels: a scan that moves no further lies where it was seen
 _OBJECTION, _CHANCE = 20.0, 0.5  # to a pair that was accepted: one that was looked through, and one that was not
-_CLOSER = 2.0   # by so much the margin may fall short there
+_CLOSE, _CLOSER = 1.7, 2.0  # by so much the margin may fall short, the latter where no known sensor objects
 
 
 class Graph:
@@ -140,7 +140,7 @@ class Graph:
             if ok and is_certain(result):
                 label[label == label[edge.j]] = label[edge.i]
             elif ok:
-                links.append((edge.i, edge.j, clarity(result)))
+                links.append((edge.i, edge.j, weight_of(result)))
         while True:
             between: dict[tuple[int, int], float] = {}
             for i, j, agrees in links:
@@ -186,16 +186,24 @@ def clarity_of(seen_through: float) -> float:
 
 
 def usable(result: PairResult) -> bool:
-    """Whether a pair says something of its poses: it is accepted, or would be if its pose were held on all sides, and,
-    where a sensor is known and did not look through the other's surface, if other poses agreed somewhat less."""
-    if result.accepted or result.evidence is None:
-        return result.accepted
-    lenient = replace(result.evidence, hold=1.0)
-    if lenient.seen_through is not None and lenient.seen_through <= _CLEAR:
-        lenient = replace(lenient, margin=_CLOSER * lenient.margin)
-    return lenient.reason.accepts
+    """Whether a pair says something of its poses: it is accepted, or would be if its pose were held on all sides and
+    other poses agreed somewhat less; less suffices where a sensor is known and did not look through the other."""
+    return weight_of(result) > 0
+
+
+def weight_of(result: PairResult) -> float:
+    """What a pair counts for where several must agree: 1 if it would be accepted but for what does not hold it."""
+    evidence = result.evidence
+    if result.accepted or evidence is None:
+        return clarity(result) * result.accepted
+    lenient = replace(evidence, hold=1.0)
+    if lenient.reason.accepts:
+        return clarity(result)
+    is_clear = evidence.seen_through is not None and evidence.seen_through <= _CLEAR
+    lenient = replace(lenient, margin=(_CLOSER if is_clear else _CLOSE) * evidence.margin)
+    return clarity(result) * (1.0 if is_clear else 0.5) * lenient.reason.accepts
 
 
 def _edge_of(i: int, j: int, result: PairResult) -> Edge:
-    strength = (result.evidence.strength if result.evidence else 1.0) * clarity(result)
+    strength = (result.evidence.strength if result.evidence else 1.0) * weight_of(result)
     return Edge(i, j, result.T_target_source, result.information, result.reference_point, max(strength, 1e-6))
