@@ -17,6 +17,7 @@ from ..clouds.cloud import PointCloud
 from ..fields.protocol import Floats
 from ..motions import inverse
 from ..register import register
+from ..result import RegistrationResult
 from .hold import Hold
 from .keyframes import Keyframe, surface_of
 from .local_map import LocalMap
@@ -118,14 +119,20 @@ class LoopSearch:
             progress(stage, len(pairs), len(pairs))
 
     def _laid(self, i: int, j: int) -> Loop | None:
-        """Keyframe j on i: near where the odometry has it, or wherever it may be, if the odometry may be anywhere."""
-        keyframe = self._keyframes[j]
-        radius = _BEYOND * (_DRIFT * (self._gone[j] - self._gone[i]) + keyframe.voxel)
-        guess: dict[str, Any] = {}
-        if radius < keyframe.radius:
-            guess = {"init": inverse(self.poses[i]) @ self.poses[j], "search_radius": float(radius)}
-        registered = register(self.around(j), self.around(i), seed=self._seed, threads=self._threads, **guess)
-        result = PairResult.of(f"step {keyframe.number}", f"step {self._keyframes[i].number}", registered)
+        """Keyframe j on i: near where the odometry has it, or else wherever it may be."""
+        radius = _BEYOND * (_DRIFT * (self._gone[j] - self._gone[i]) + self._keyframes[j].voxel)
+        near: dict[str, Any] = {"init": inverse(self.poses[i]) @ self.poses[j], "search_radius": float(radius)}
+        surfaces = self.around(j), self.around(i)
+        for guess in (near, {}) if radius < self._keyframes[j].radius else ({},):
+            result = register(*surfaces, seed=self._seed, threads=self._threads, **guess)
+            if (loop := self._confirmed(i, j, result)) is not None:
+                return loop
+        return None
+
+    def _confirmed(self, i: int, j: int, registered: RegistrationResult) -> Loop | None:
+        """The loop, where the registration is accepted, or would be if all were held, and the tracked scan is held."""
+        source, target = (f"step {self._keyframes[k].number}" for k in (j, i))
+        result = PairResult.of(source, target, registered)
         if not usable(result):
             return None
         found = self._tracked(i, j, result.T_target_source)
