@@ -31,7 +31,7 @@ bench-fields:                     ## every kind of field on each other, meshes, 
 	$(MAKE) VENV=$(VENV)-bench $(VENV)-bench/.installed-bench,mesh
 	$(VENV)-bench/bin/python benchmarks/fields.py --output docs/benchmarks
 
-bench-assemble:                   ## many scans: real sets and a heap of them beside the peers, a building; two hours
+bench-assemble:                   ## many scans: real sets and a heap of them beside the peers, a building; an hour
 	$(MAKE) VENV=$(VENV)-bench $(VENV)-bench/.installed-bench,dask
 	$(VENV)-bench/bin/python benchmarks/assemble.py --output docs/benchmarks
 

@@ -8,7 +8,7 @@ part. Data: ../shared/data or $FIELDALIGN_DATA. Beside fieldalign, on the separa
 with FPFH + RANSAC and with KISS-Matcher for the pairs, told a voxel that suits each set; fieldalign is told nothing.
 They take a second a pair, and run on the first of three seeds.
 The building (benchmarks/building.py) is made in /tmp or --building, levelled, then free: 2.6 GB at a time, with --keep
-twice that. Two hours on two cores; --quick takes some minutes.
+twice that. An hour on two cores; --quick takes some minutes.
 """
 
 from __future__ import annotations
