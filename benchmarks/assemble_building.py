@@ -18,6 +18,8 @@ from pathlib import Path
 import building
 import numpy as np
 
+from fieldalign.motions import best_motion
+
 FOLDER = building.FOLDER
 SCANS, POINTS, PART = 200, 1_000_000, 40
 SMALL_SCANS, SMALL_POINTS, SMALL_PART = 12, 50_000, 6
@@ -118,16 +120,22 @@ def _held(process) -> int:
 
 
 def off(poses: np.ndarray, T: np.ndarray) -> dict:
-    """Metres by which each scanner's place is off, after all places are laid on the true ones by least squares."""
-    placed = np.isfinite(poses[:, 0, 0])
+    """Metres by which each scanner's place is off, after the poses are laid on the true ones by the motion of the scan
+    with which most others agree, and then by least squares of those."""
+    placed = np.flatnonzero(np.isfinite(poses[:, 0, 0]))
     metres = np.full(len(T), np.nan)
-    if placed.sum() >= 3:
-        here, there = poses[placed, :3, 3], T[placed, :3, 3]
-        U, _, Vt = np.linalg.svd((here - here.mean(axis=0)).T @ (there - there.mean(axis=0)))
-        R = (U @ np.diag([1, 1, np.linalg.det(U @ Vt)]) @ Vt).T
-        metres[placed] = np.linalg.norm((here - here.mean(axis=0)) @ R.T - (there - there.mean(axis=0)), axis=1)
+    if len(placed) >= 3:
+        there = T[placed, :3, 3]
+        tried = [_places(M, poses[placed]) for M in T[placed] @ np.linalg.inv(poses[placed])]
+        agree = max((np.linalg.norm(here - there, axis=1) <= LIMIT for here in tried), key=np.sum)
+        M = best_motion(poses[placed][agree, :3, 3], there[agree]) if agree.sum() >= 3 else np.eye(4)
+        metres[placed] = np.linalg.norm(_places(M, poses[placed]) - there, axis=1)
     within = int((metres <= LIMIT).sum())
-    return {"placed": int(placed.sum()), "within": within, "m": [None if np.isnan(m) else float(m) for m in metres]}
+    return {"placed": len(placed), "within": within, "m": [None if np.isnan(m) else float(m) for m in metres]}
+
+
+def _places(M: np.ndarray, poses: np.ndarray) -> np.ndarray:
+    return poses[:, :3, 3] @ M[:3, :3].T + M[:3, 3]
 
 
 def _run(job: Path) -> None:
