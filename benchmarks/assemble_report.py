@@ -43,8 +43,8 @@ ABOUT_BUILDING = """\
 {scans} scans of a simulated building (benchmarks/building.py) with exact truth, from files, on two processes; told that
 each scan is in the frame of its sensor. Error: of the scanner's place, in the largest component, after that is laid on
 the truth by those places that agree. Memory: the peak of all processes together, shared pages counted once. Of the
-surface that a scan sees, its nearest neighbour sees {first} (smallest, tenth, half, nine tenths of the scans), its third
-nearest {third}; the chain that joins all has a link of {weakest}.
+surface that a scan sees, its nearest neighbour sees {first} (smallest, tenth, half, nine tenths of the scans), its
+third nearest {third}; the chain that joins all has a link of {weakest}.
 """
 ABOUT_EXECUTORS = """\
 {scans} scans of the same building, levelled, in one process on two threads, in two processes and on a Dask cluster of

@@ -107,14 +107,15 @@ nb::dict tracked(VoxelMap& map, Scan scan, Pose4 start, Values origin, std::opti
     twists.emplace();
     for (int i = 0; i < 6; ++i) std::copy_n(held->data() + 6 * i, 6, twists->columns[i].begin());
   }
+  const double certain_gate = s("certain_gate"), certain_flatness = s("certain_flatness");
   Tracked found;
   CertaintySums<6> known;
   {
     nb::gil_scoped_release free;
     found = track(map, scan_of(scan), motion_of(start.data()), about, loss, schedule, before, twists);
-    loss.gate = s("certain_gate");
+    loss.gate = certain_gate;
     if (!is_whole)
-      known = certainty_sums(map, found.scan, found.cells, found.pose, about, loss, found.sums.scale, s("certain_flatness"));
+      known = certainty_sums(map, found.scan, found.cells, found.pose, about, loss, found.sums.scale, certain_flatness);
   }
   nb::dict result;
   result["motion"] = pose_array(found.pose);

@@ -82,7 +82,7 @@ inline TrackSums track_sums(VoxelMap& map, std::span<const ScanPoint> scan, std:
   meet_planes(map, scan, cells, pose, origin, loss, [&](const Met& m) {
     ++sums.met;
     sums.on += std::abs(m.r) < 4 * loss.thickness;
-    if (std::abs(m.r) > loss.gate) return;
+    if (!(std::abs(m.r) <= loss.gate)) return;  // nor what is no number
     met.push_back(m);
     sizes.push_back(std::abs(m.r) / m.spread);
   });
