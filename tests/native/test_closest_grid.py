@@ -26,7 +26,7 @@ def looked_up(means, queries, cell=CELL, margin=MARGIN):
     for axis, up in enumerate(np.eye(3)):
         normals = np.tile(up, (len(means), 1))
         grid = _core.ClosestGrid(np.ascontiguousarray(means), normals, cell, margin)
-        _, g, totals = grid.robust_sums(np.zeros((1, 3)), up[None], np.zeros(1), poses, 1e9, 0.5, 1e9, 1)
+        _, g, totals = grid.robust_sums(np.zeros((1, 3)), up[None], np.zeros(1), poses, 1e9, 0.5, 1e9, False, 1)
         offsets[:, axis] = np.where(totals[:, 3] == 1, g[:, 3 + axis], np.nan)
     return offsets
 
@@ -137,11 +137,11 @@ def test_a_grid_of_nothing_and_arrays_of_other_lengths_are_refused():
     grid = _core.ClosestGrid(np.eye(3), np.eye(3), 1, 1)
     for normals, offsets in ((2, 3), (3, 2)):
         with pytest.raises(ValueError, match="length"):
-            grid.robust_sums(np.eye(3), np.eye(3)[:normals], np.zeros(offsets), np.eye(4)[None], 1, 0, 1, 1)
+            grid.robust_sums(np.eye(3), np.eye(3)[:normals], np.zeros(offsets), np.eye(4)[None], 1, 0, 1, False, 1)
     with pytest.raises(ValueError, match="length"):
-        grid.agreement(np.eye(3), np.eye(3)[:2], np.ones(3), np.eye(4)[None], 1, 0, 1, 1)
+        grid.agreement(np.eye(3), np.eye(3)[:2], np.ones(3), np.eye(4)[None], 1, 0, 1, False, 1)
     with pytest.raises(ValueError, match="length"):
-        grid.agreement(np.eye(3), np.eye(3), np.ones(2), np.eye(4)[None], 1, 0, 1, 1)
+        grid.agreement(np.eye(3), np.eye(3), np.ones(2), np.eye(4)[None], 1, 0, 1, False, 1)
 
 
 # --------------------------------------------------------------------------------------------------------------- sums
@@ -163,8 +163,8 @@ def scene(rng):
 def test_each_pose_is_summed_alone_and_by_any_number_of_threads(scene):
     grid, means, normals, rows, offsets, poses = scene
     pseudo = means[rows] + offsets[:, None] * normals[rows], normals[rows], offsets
-    together = [grid.robust_sums(*pseudo, poses, 0.1, 0.8, 0.5, threads) for threads in (1, 2, 8)]
-    alone = [grid.robust_sums(*pseudo, poses[k : k + 1], 0.1, 0.8, 0.5, 1) for k in range(5)]
+    together = [grid.robust_sums(*pseudo, poses, 0.1, 0.8, 0.5, False, threads) for threads in (1, 2, 8)]
+    alone = [grid.robust_sums(*pseudo, poses[k : k + 1], 0.1, 0.8, 0.5, False, 1) for k in range(5)]
     for part in range(3):
         assert all(np.array_equal(other[part], together[0][part]) for other in together)
         assert np.array_equal(np.concatenate([one[part] for one in alone]), together[0][part])
@@ -175,10 +175,10 @@ def test_a_normals_sign_means_nothing(scene, rng):
     grid, means, normals, rows, offsets, poses = scene
     signs = rng.choice([-1.0, 1.0], 500)
     places = means[rows] + offsets[:, None] * normals[rows]
-    plain = grid.robust_sums(places, normals[rows], offsets, poses, 0.1, 0.8, 0.5, 1)
-    turned = grid.robust_sums(places, signs[:, None] * normals[rows], signs * offsets, poses, 0.1, 0.8, 0.5, 1)
+    plain = grid.robust_sums(places, normals[rows], offsets, poses, 0.1, 0.8, 0.5, False, 1)
+    turned = grid.robust_sums(places, signs[:, None] * normals[rows], signs * offsets, poses, 0.1, 0.8, 0.5, False, 1)
     flipped = _core.ClosestGrid(means, rng.choice([-1.0, 1.0], (2000, 1)) * normals, CELL, MARGIN)
-    other = flipped.robust_sums(places, normals[rows], offsets, poses, 0.1, 0.8, 0.5, 1)
+    other = flipped.robust_sums(places, normals[rows], offsets, poses, 0.1, 0.8, 0.5, False, 1)
     for part in range(3):
         size = np.abs(plain[part]).max()
         assert np.allclose(plain[part], turned[part], rtol=0, atol=1e-12 * size)
@@ -203,7 +203,7 @@ def test_the_sums_over_known_planes_are_those_of_the_grid(scene):
         np.linalg.norm(x[known] - narrow[0], axis=1) <= 0.5
     )
     scale = 3 * 1.4826 * np.sort(np.abs(r[taken]))[taken.sum() // 2]
-    expected = grid.robust_sums(means[rows], normals[rows], np.zeros(500), poses[:1], scale, 0.8, 0.5, 1)
+    expected = grid.robust_sums(means[rows], normals[rows], np.zeros(500), poses[:1], scale, 0.8, 0.5, False, 1)
     H, g = H[:, :6, :6], g[:, :6]  # the grid knows no growth
     for got, wanted in zip((H, g, totals), expected, strict=True):
         assert np.allclose(got, wanted, rtol=0, atol=1e-6 * np.abs(wanted).max())
@@ -228,9 +228,9 @@ def test_nothing_near_is_nothing_summed(scene):
     grid, means, normals, rows, offsets, poses = scene
     away = poses.copy()
     away[:, 0, 3] = 1e4
-    for sums in grid.robust_sums(means[rows], normals[rows], offsets, away, 0.1, 0.8, 0.5, 1):
+    for sums in grid.robust_sums(means[rows], normals[rows], offsets, away, 0.1, 0.8, 0.5, False, 1):
         assert not sums.any()
-    assert not grid.agreement(means[rows], normals[rows], np.ones(500), away, 0.1, 0.8, 0.5, 1).any()
+    assert not grid.agreement(means[rows], normals[rows], np.ones(500), away, 0.1, 0.8, 0.5, False, 1).any()
     sums, hold, scatter, _ = _core.robust_sums(means + 9, normals, means, normals, np.ones(2000), 0.8, 0.5, 3.0, 0.0)
     for matrix in (*sums, hold, scatter):
         assert not matrix.any()
