@@ -173,10 +173,11 @@ def test_the_seed_and_nothing_else_decides(pair, found):
 def test_files_arrays_and_prepared_clouds_are_clouds(clouds, pair, verified, tmp_path):
     np.save(tmp_path / "source.npy", pair.source.points)
     fa.write_cloud(tmp_path / "target.ply", pair.target.points)
+    expected = fa.verify(pair.source.points, pair.target.points, verified.T_target_source)
     for source, target in ((tmp_path / "source.npy", str(tmp_path / "target.ply")), (clouds[0], pair.target.points)):
         result = fa.verify(source, target, verified.T_target_source.tolist())
         assert result.accepted
-        assert result.evidence.margin == pytest.approx(verified.evidence.margin, rel=1e-6)
+        assert result.evidence.margin == pytest.approx(expected.evidence.margin, rel=1e-6)
     without = fa.verify(tmp_path / "source.npy", pair.target.points, np.eye(4), search=False)
     assert without.evidence.seen_through is None
 
