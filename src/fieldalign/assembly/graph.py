@@ -191,16 +191,21 @@ def usable(result: PairResult) -> bool:
     return weight_of(result) > 0
 
 
+def accepted_if_held(result: PairResult) -> bool:
+    """Whether a pair is accepted, or would be if its pose were held on all sides, as it is not along a street."""
+    evidence = result.evidence
+    return result.accepted or (evidence is not None and replace(evidence, hold=1.0).reason.accepts)
+
+
 def weight_of(result: PairResult) -> float:
     """What a pair counts for where several must agree: 1 if it would be accepted but for what does not hold it."""
     evidence = result.evidence
-    if result.accepted or evidence is None:
-        return clarity(result) * result.accepted
-    lenient = replace(evidence, hold=1.0)
-    if lenient.reason.accepts:
+    if accepted_if_held(result):
         return clarity(result)
+    if evidence is None:
+        return 0.0
     is_clear = evidence.seen_through is not None and evidence.seen_through <= _CLEAR
-    lenient = replace(lenient, margin=(_CLOSER if is_clear else _CLOSE) * evidence.margin)
+    lenient = replace(evidence, hold=1.0, margin=(_CLOSER if is_clear else _CLOSE) * evidence.margin)
     return clarity(result) * (1.0 if is_clear else 0.5) * lenient.reason.accepts
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from .. import _core
 from ..assembly.consensus import consensus
-from ..assembly.graph import usable
+from ..assembly.graph import accepted_if_held
 from ..assembly.pair_result import PairResult
 from ..assembly.pose_graph import Edge
 from ..clouds.cloud import PointCloud
@@ -133,7 +133,7 @@ class LoopSearch:
         """The loop, where the registration is accepted, or would be if all were held, and the tracked scan is held."""
         source, target = (f"step {self._keyframes[k].number}" for k in (j, i))
         result = PairResult.of(source, target, registered)
-        if not usable(result):
+        if not accepted_if_held(result):
             return None
         found = self._tracked(i, j, result.T_target_source)
         hold = Hold(found)
