@@ -13,7 +13,9 @@ import click
 
 from ..errors import FieldalignError
 
-VERBS = ("register", "verify", "batch", "assemble", "odometry", "localize", "evaluate", "deviation", "demo")
+VERBS = (
+    "register", "verify", "batch", "assemble", "odometry", "localize", "evaluate", "deviation", "experiment", "demo",
+)
 
 
 class LazyVerbs(click.Group):

@@ -1,0 +1,69 @@
+"""fieldalign experiment NAME: the paper's experiments, one command each."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from ..assembly.executor import as_executor
+from ..errors import ArgumentError
+from ..experiments import NAMES, Request, run
+from ..threads import resolve_threads
+from .executors import bar, chosen_executor, executor_options
+
+
+@click.command("experiment")
+@click.argument("name", type=click.Choice(list(NAMES)))
+@click.option("--data", required=True, type=click.Path(exists=True, file_okay=False),
+              help="The folder of the data set, in its published layout.")
+@click.option("--output", required=True, type=click.Path(file_okay=False), help="The folder of the results.")
+@click.option("--peers", type=click.Path(exists=True, file_okay=False),
+              help="Measure other people's methods, too: a folder of adapters, such as benchmarks/peers.")
+@click.option("--columns", help="Measure these methods only, by name, with commas between them.")
+@click.option("--pointnetlk-revisited", "pointnetlk", type=click.Path(exists=True, file_okay=False),
+              help="A checkout of PointNetLK-Revisited with its weights, to be measured, too (with --peers).")
+@click.option("--limit", type=click.IntRange(min=1), help="At most so many cases, spread evenly.")
+@executor_options
+def command(
+    name: str,
+    data: str,
+    output: str,
+    peers: str | None,
+    columns: str | None,
+    pointnetlk: str | None,
+    limit: int | None,
+    run_folder: str | None,
+    workers: int | None,
+    dask: str | None,
+    seed: int,
+) -> int:
+    """Run an experiment of the paper on its data set, as people have it on disk.
+
+    Writes NAME.json (protocol, versions, seeds, every pair), NAME.md (the table, published figures beside) and NAME.png
+    into the folder, which is made where it is not there. Called again after an interruption it goes on from there.
+    """
+    folder = _folder(output)
+    if pointnetlk is not None and peers is None:
+        raise ArgumentError("--pointnetlk-revisited needs --peers FOLDER, which holds its adapter")
+    checkouts = {} if pointnetlk is None else {"pointnetlk-revisited": Path(pointnetlk)}
+    executor = as_executor(chosen_executor(workers or resolve_threads(None), dask))
+    with bar() as tell:
+        report = run(name, Request(
+            Path(data), folder, executor, seed, limit, None if columns is None else tuple(columns.split(",")),
+            None if peers is None else Path(peers), checkouts,
+            Path(run_folder) if run_folder else folder / f"{name}.run", tell,
+        ))
+    click.echo(report.text)
+    for file in report.files:
+        click.echo(f"wrote {file}")
+    return 0
+
+
+def _folder(output: str) -> Path:
+    folder = Path(output)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ArgumentError(f"--output {output} cannot be made: {error.strerror or error}") from error
+    return folder

@@ -1,0 +1,68 @@
+"""Tables in Markdown: the measures of every method, and published figures beside."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from .results import Results
+
+Cell = str | float | int | None
+
+
+def as_markdown(header: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
+    """A table with aligned columns; numbers with three significant digits, nothing where there is None."""
+    lines = [list(header)] + [[cell if isinstance(cell, str) else number(cell) for cell in row] for row in rows]
+    widths = [max(len(line[k]) for line in lines) for k in range(len(header))]
+    rule = ["-" * width for width in widths]
+    return "\n".join(
+        "| " + " | ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)) + " |"
+        for line in [lines[0], rule, *lines[1:]]
+    )
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """A number for people."""
+    if value is None:
+        return ""
+    if isinstance(value, int):
+        return str(value)
+    return f"{value:.{digits}g}" if abs(value) < 1000 else f"{value:.0f}"
+
+
+def accuracy(results: Results, unit: str = "", group: str | None = None, pooled: bool = False) -> str:
+    """The table of a group of cases (None: all), a row for each method. pooled: with the pooled Euler measure, too."""
+    modulo = any("rre_modulo_deg" in row for row in results.rows.values())
+    in_unit = f" ({unit})" if unit else ""
+    header = ["method", "RRE RMSE (deg)", "RRE median", f"RTE RMSE{in_unit}", "RTE median"]
+    header += ["RRE RMSE modulo symmetry", "RTE RMSE modulo symmetry"] if modulo else []
+    header += ["Euler RMSE (deg)", "Euler median", "shift RMSE, by component", "shift median"] if pooled else []
+    header += [f"within {results.success[0]:g} deg, {results.success[1]:g} {unit}".rstrip(), "CPU ms"]
+    return as_markdown(header, [
+        _row(title, results.summary(method, group), modulo, pooled) for method, title in results.titles.items()
+    ])
+
+
+def _row(title: str, found: dict[str, Any], modulo: bool, pooled: bool) -> list[Cell]:
+    """A method's cells; the sums are over the cases in which it gave a pose, the share of successes over all."""
+    if found["without_pose"]:
+        title += f" (no pose in {found['without_pose']} of {found['cases']})"
+    cells: list[Cell] = [title]
+    for kind in ("rre_deg", "rte"):
+        cells += [_with_interval(found.get(kind)), found[kind]["median"] if kind in found else None]
+    if modulo:
+        cells += [_with_interval(found.get(kind)) for kind in ("rre_modulo_deg", "rte_modulo")]
+    if pooled:
+        for kind in ("euler_deg", "translation_components"):
+            cells += [found.get(kind, {}).get(measure) for measure in ("rmse", "median")]
+    share, (low, high) = found["success"]["share"], found["success"]["interval"]
+    milliseconds = 1e3 * found["cpu_seconds"] if "cpu_seconds" in found else None
+    return [*cells, f"{share:.3f} ({low:.3f}-{high:.3f})", milliseconds]
+
+
+def _with_interval(found: dict[str, Any] | None) -> str:
+    """An RMSE and its 95 % interval."""
+    if not found or found["rmse"] is None:
+        return ""
+    low, high = found["rmse_interval"]
+    return f"{number(found['rmse'])} ({number(low)}-{number(high)})"
