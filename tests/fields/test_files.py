@@ -170,17 +170,29 @@ def test_the_vertices_of_a_ply_are_those_of_its_cloud(tmp_path):
             [["1/1", "2/2", "3/1"], ["1//7", "4//8", "2//9"], ["2/1/1", "4/2/2", "3/3/3"], [3, 4, "1 # the last"]],
             "vt 0 0\n",
         ),
+        ([["1/1/1", "2/2/2", "3/1/3"], ["1//7", "4//8", "2//9"], ["2/1", "4/2", "3/3"], ["3/5", "4", "1/7"]], ""),
         ([[1, 2, 3], [1, 4, 2], [2, 4, 3], [3, 4, 1]], "mtllib nowhere.mtl\no part\ng side\nusemtl steel\ns off\n"),
     ],
-    ids=["plain", "from behind", "with textures and normals", "with materials"],
+    ids=["plain", "from behind", "with textures", "mixed", "with materials"],
 )
 def test_objs_as_programs_write_them(faces, between, tmp_path):
     assert is_the_tetrahedron(read_field(obj(tmp_path / "part.obj", CORNERS, faces, between)))
 
 
-@pytest.mark.parametrize("head", ["OFF\n", "OFF ", "OFF # a comment\n\n# another\n", "COFF\n", "STCNOFF\n"])
+@pytest.mark.parametrize("head", ["OFF\n", "OFF ", "OFF", "OFF # a comment\n\n# another\n", "COFF\n", "STCNOFF\n"])
 def test_offs_as_programs_write_them(head, tmp_path):
     assert is_the_tetrahedron(read_field(off(tmp_path / "part.off", CORNERS, TRIANGLES, head)))
+
+
+def test_an_off_of_polygons(tmp_path):
+    for polygons, triangles in ((SQUARES, 12), ([*SQUARES[:5], SQUARES[5][:3]], 11), ([SQUARES[0][:3], SQUARES[1]], 3)):
+        assert len(read_field(off(tmp_path / "cube.off", CUBE, polygons))) == triangles
+
+
+@pytest.mark.parametrize("corner", ["1.5", "x", "nan", "1e300", "9007199254740993"])
+def test_an_off_whose_corners_are_no_whole_numbers(corner, tmp_path):
+    (tmp_path / "part.off").write_text("OFF\n4 1 0\n" + ROWS + f"0 0 1\n3 0 {corner} 2\n")
+    assert refused(tmp_path / "part.off")
 
 
 def test_colours_in_an_off_are_left_out(tmp_path):
@@ -377,6 +389,9 @@ def test_lists_before_the_faces_are_told(tmp_path):
         ([[1, 2]], "has a face that is none: 'f 1 2'"),
         ([[0, 1, 2]], "has a face that is none: 'f 0 1 2'"),
         ([[]], "has a face that is none: 'f'"),
+        ([[1, 2, 3], []], "has a face that is none: 'f'"),
+        ([[1, 2, 3], [1, 2, 3, "/4"]], "cannot be read as .obj"),
+        ([[1, 2, 3], [1, 2, "3f"]], "cannot be read as .obj"),
         ([[1, 2, "x"]], "cannot be read as .obj"),
         ([[1, 2, "/3"]], "cannot be read as .obj"),
         ([[1, 2, 3.5]], "cannot be read as .obj"),

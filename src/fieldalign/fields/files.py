@@ -12,6 +12,7 @@ from ..clouds.checks import checked_points
 from ..clouds.cloud import PointCloud
 from ..clouds.files import FORMATS, PathLike, check_existing, errors_naming, logger, read_cloud, split_part
 from ..clouds.formats import triangles
+from ..clouds.formats.off import read_off
 from ..clouds.formats.ply_faces import read_ply_faces
 from ..errors import CloudFileError
 from ..threads import resolve_threads
@@ -25,7 +26,7 @@ MESHES = {
     ".ply": read_ply_faces,
     ".stl": triangles.read_stl,
     ".obj": triangles.read_obj_faces,
-    ".off": triangles.read_off,
+    ".off": read_off,
 }
 VOLUMES = (".nrrd", ".nhdr", ".vdb")
 

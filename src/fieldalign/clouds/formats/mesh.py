@@ -50,9 +50,14 @@ def check_whole_stl(path: Path) -> None:
 
 def _numbers_after(path: Path, keyword: bytes) -> Array:
     """The three numbers after the keyword, of each line that begins with it."""
-    with path.open("rb") as file:
-        words_of_lines = (line.split(None, 4) for line in file)
-        rows = [tuple(map(float, words[1:4])) for words in words_of_lines if words[:1] == [keyword]]
-    if any(len(row) != 3 for row in rows):
+    lines = lines_after(path, keyword)
+    if any(len(line.split(None, 4)) < 4 for line in lines):
         raise CloudFileError(f"has a line '{keyword.decode()}' with less than three numbers")
-    return np.array(rows, float).reshape(-1, 3)
+    return np.loadtxt(lines, usecols=(1, 2, 3), ndmin=2) if lines else np.empty((0, 3))
+
+
+def lines_after(path: Path, keyword: bytes) -> list[bytes]:
+    """The lines that begin with a word, and this."""
+    starts = tuple(keyword + blank for blank in (b" ", b"\t", b"\r", b"\n"))
+    with path.open("rb") as file:
+        return [line for line in file if line.startswith(starts) or line.split(None, 1)[:1] == [keyword]]

@@ -1,4 +1,4 @@
-"""The triangles of meshes: STL, OBJ and OFF; those of PLY are read in ply_faces.py. All four are written.
+"""The triangles of meshes: STL and OBJ; those of PLY are read in ply_faces.py, of OFF in off.py. All four are written.
 
 A reader returns the vertices as a cloud and the triangles (F, 3) as rows of it. Only STL is read by trimesh: it takes
 a truncated OBJ or OFF for a shorter one, and an OBJ's corner 0 for its last.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import chain, islice
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -16,9 +16,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...errors import CloudFileError
 from ..cloud import PointCloud
-from .mesh import check_whole_stl, read_obj
+from .mesh import check_whole_stl, lines_after, read_obj
 
 Triangles = NDArray[np.int64]
+
+_LARGEST = 2**53  # up to where float64 holds every whole number
+_BESIDE_CORNERS = re.compile(rb"(?m)^\s*f(?=\s)|(?<=\d)/[\d/]*(?=\s)|#.*$")  # of an OBJ's face: all but the vertices
 
 
 def fans(counts: ArrayLike, corners: ArrayLike) -> Triangles:
@@ -52,8 +55,29 @@ def read_stl(path: Path) -> tuple[PointCloud, Triangles]:
 
 def read_obj_faces(path: Path) -> tuple[PointCloud, Triangles]:
     """The vertices in the order of the file, and the triangles of its faces, if it has any."""
+    vertices = read_obj(path)
+    table = _obj_table(lines_after(path, b"f"))
+    if table is not None:
+        return vertices, fans(np.full(len(table), table.shape[1]), table.ravel() - 1)
     with path.open("rb") as file:
-        return read_obj(path), fans_of(list(_obj_polygons(file)))
+        return vertices, fans_of(list(_obj_polygons(file)))
+
+
+def whole_numbers(rows: list[bytes], columns: Sequence[int] | None = None) -> Triangles | None:
+    """A table of whole numbers, at once; None where rows differ in length, or hold anything else."""
+    try:
+        table = np.loadtxt(rows, usecols=columns, ndmin=2)  # float64: what is no whole number must be seen
+    except ValueError:
+        return None
+    is_whole = np.array_equal(table, np.rint(table)) and np.abs(table).max() < _LARGEST
+    return table.astype(np.int64) if is_whole and len(table) == len(rows) else None
+
+
+def _obj_table(lines: list[bytes]) -> Triangles | None:
+    """The corners (F, k) of faces that all have k of them, counted from 1; None where they have not."""
+    rows = _BESIDE_CORNERS.sub(b"", b"".join(lines)).splitlines()
+    table = whole_numbers(rows) if rows and rows[0].strip() else None
+    return table if table is not None and table.shape[1] >= 3 and table.min() > 0 else None
 
 
 def _obj_polygons(lines: Iterable[bytes]) -> Iterator[list[int]]:
@@ -68,23 +92,6 @@ def _obj_polygons(lines: Iterable[bytes]) -> Iterator[list[int]]:
             if len(numbers) < 3 or 0 in numbers:
                 raise CloudFileError(f"has a face that is none: {line.decode('ascii', 'replace').strip()[:60]!r}")
             yield [n - 1 if n > 0 else seen + n for n in numbers]
-
-
-def read_off(path: Path) -> tuple[PointCloud, Triangles]:
-    """OFF as text, with colours, normals or texture places, which are left out."""
-    with path.open("rb") as file:
-        rows = (words for line in file if (words := line.partition(b"#")[0].split()))
-        head = next(rows, [])
-        if not (head and re.fullmatch(b"(ST)?C?N?OFF", head[0])):
-            raise CloudFileError("is not an OFF file: it does not begin with 'OFF'")
-        vertices, faces = _off_counts(head[1:] or next(rows, []))
-        places = [row[:3] for row in islice(rows, vertices)]
-        polygons = [_polygon(row) for row in islice(rows, faces)]
-    if len(places) != vertices or len(polygons) != faces:
-        raise CloudFileError(
-            f"promises {vertices} vertices and {faces} faces, but holds {len(places)} and {len(polygons)}"
-        )
-    return PointCloud(np.array(places, float)), fans_of(polygons)
 
 
 def write(path: Path, vertices: NDArray[np.float64], faces: Triangles) -> None:
@@ -107,21 +114,3 @@ def _write_ply(path: Path, vertices: NDArray[np.float64], faces: Triangles) -> N
         file.write("\n".join(lines).encode())
         file.write(vertices.astype("<f8").tobytes())
         file.write(rows.tobytes())
-
-
-def _off_counts(words: list[bytes]) -> tuple[int, int]:
-    try:
-        vertices, faces = map(int, words[:2])
-    except ValueError as error:
-        raise CloudFileError("must say how many vertices and faces it has, as text, after 'OFF'") from error
-    if vertices < 1 or faces < 0:
-        raise CloudFileError(f"must have vertices, but says that it has {vertices} and {faces} faces")
-    return vertices, faces
-
-
-def _polygon(row: list[bytes]) -> list[int]:
-    """A face that is written as its number of corners, these, and perhaps a colour."""
-    count = int(row[0])
-    if not 0 <= count < len(row):
-        raise CloudFileError(f"has a face of {count} corners with {len(row) - 1} of them")
-    return [int(word) for word in row[1 : 1 + count]]
