@@ -3,6 +3,7 @@
     FieldalignError
     ├── ArgumentError (ValueError)       an argument has the wrong shape, value or combination
     │   ├── CloudFileError               a file is missing, truncated, foreign or promises what it does not hold
+    │   ├── DataSetError                 a folder holds nothing of a data set, or something that cannot be of it
     │   └── FieldError                   a distance field answered with the wrong shape or with NaN or infinity
     ├── RunError                         work on many scans cannot begin or go on: its folder, the disk, the workers
     └── MissingExtraError (ImportError)  an optional dependency is not installed; the message names the extra
@@ -21,6 +22,10 @@ class ArgumentError(FieldalignError, ValueError):
 
 class CloudFileError(ArgumentError):
     """A file is missing, truncated, foreign or promises what it does not hold."""
+
+
+class DataSetError(ArgumentError):
+    """A folder holds nothing of a data set of the experiments, or something that cannot be of it."""
 
 
 class FieldError(ArgumentError):
