@@ -42,6 +42,15 @@ def inverse(T: Matrix) -> Matrix:
     return inverted
 
 
+def angles_between(T: ArrayLike, other: ArrayLike) -> Matrix:
+    """The angles (...), rad, between the rotations of motions (..., 4, 4).
+
+    By the chord, 2 asin(|R - R_other|_F / (2 sqrt 2)): the usual arccos of the trace cannot see below 1e-8.
+    """
+    chord = np.linalg.norm(np.asarray(T)[..., :3, :3] - np.asarray(other)[..., :3, :3], axis=(-2, -1))
+    return np.asarray(2 * np.arcsin(np.minimum(chord / np.sqrt(8), 1.0)))
+
+
 def translation(offset: ArrayLike) -> Matrix:
     """The motion (4, 4) that shifts by `offset` (3,)."""
     T = np.eye(4)

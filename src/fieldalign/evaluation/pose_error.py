@@ -7,16 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..motions import Matrix
+from ..motions import Matrix, angles_between
 
 
 def rotation_errors(T: ArrayLike, T_true: ArrayLike) -> Matrix:
-    """RRE in degrees between motions (..., 4, 4): the angle of R^T R_true; shape (...).
-
-    By the chord, 2 asin(|R - R_true|_F / (2 sqrt 2)): the usual arccos of the trace cannot see below 1e-6 degrees.
-    """
-    chord = np.linalg.norm(np.asarray(T)[..., :3, :3] - np.asarray(T_true)[..., :3, :3], axis=(-2, -1))
-    return np.asarray(np.degrees(2 * np.arcsin(np.minimum(chord / np.sqrt(8), 1.0))))
+    """RRE in degrees between motions (..., 4, 4): the angle of R^T R_true; shape (...)."""
+    return np.asarray(np.degrees(angles_between(T, T_true)))
 
 
 def translation_errors(T: ArrayLike, T_true: ArrayLike) -> Matrix:

@@ -16,6 +16,7 @@ from .refined import Refined, certainty, sketch
 
 CLEARLY_OTHER = Apart(0.966, 5.0)  # 15 degrees, or voxels
 RIVAL = 0.9               # of the best score: a pose that the data cannot tell from it
+_EQUAL = 0.98             # of the best score: a pose that is as good; the one nearest to a guess comes first
 
 
 _NEARLY_ALL = 0.95
@@ -61,7 +62,8 @@ class Contest:
 
 
 def judged(pair: Pair, refined: list[Refined], contest: Contest, threads: int) -> list[RegistrationResult]:
-    """A result for each pose that agrees about as well as the best, best first."""
+    """A result for each pose that agrees about as well as the best, best first; of equal ones the one that turns least
+    from the guess."""
     held, moving = pair.surfaces()
     if any(r.meets for r in refined):  # to the last digits: what only comes near is no rival
         refined = [r for r in refined if r.meets]
@@ -73,6 +75,9 @@ def judged(pair: Pair, refined: list[Refined], contest: Contest, threads: int) -
         contest, poses=np.concatenate([poses, contest.poses]), scores=np.r_[scores, contest.scores]
     )
     order = [k for k in np.argsort(-scores, kind="stable") if scores[k] >= RIVAL * scores.max()]
+    if pair.guessed_pose is not None:
+        unturned = np.einsum("bij,ij->b", poses[:, :3, :3], pair.guessed_pose[:3, :3])
+        order.sort(key=lambda k: -unturned[k] if scores[k] >= _EQUAL * scores.max() else np.inf)
     return [_result(pair, refined[k], (there.of(k), back.of(k)), all_of_them) for k in order]
 
 

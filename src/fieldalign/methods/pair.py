@@ -9,10 +9,11 @@ import numpy as np
 from ..dof import Allowed, Dof, allowed_poses
 from ..fields.protocol import Floats, Planes
 from ..lazy import lazy
-from ..motions import apply, growth, inverse, size_of, translation
+from ..motions import angles_between, apply, growth, inverse, size_of, translation
 from ..prepared import PreparedCloud
 from ..surface import Surface
 
+_SLACK = np.radians(2)  # beyond an angle around the guess, at which a pose may end
 _LOOKED_AT = 3000  # surfels, about, of which it is asked whether a sensor looked through them
 
 
@@ -106,6 +107,11 @@ class Pair:
                 places = apply(motion, some + surface.origin)
                 shares.append(float(by.sight.looked_through(places, self.voxel).mean()))
         return max(shares, default=None)
+
+    def is_within(self, angle: float, T: Floats) -> bool:
+        """Whether a motion T_target_source (4, 4) turns by no more than an angle (rad) from the guess, but for some
+        slack; where there is none, any does."""
+        return self.guess is None or bool(angles_between(T, self.guess) <= angle + _SLACK)
 
     @property
     def guessed_pose(self) -> Floats | None:

@@ -6,6 +6,7 @@
     anneal    all of them at once, from coarse to fine (alignment/robust.py)
     refine    the best, on the exact fields, to convergence (refined.py)
     judge     what speaks for each pose and against it (judged.py, verdict/)
+    points    where there are no surfels to speak of, the paper's method from many turns (by_points.py)
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from ..scale import common_voxel
 from ..search import ROUNDS, Confinement, search
 from ..surface import main_axes
 from ..threads import side_by_side
+from .by_points import by_points, is_for_points
 from .judged import CLEARLY_OTHER, RIVAL, Contest, judged
 from .pair import Pair
 from .refined import Refined, at_copies, at_its_size, last_level, left_at, refine
@@ -67,6 +69,9 @@ def register_robust(
     clock.lap("search")
     poses, scores = anneal(held, moving, poses, seed, threads, pair.allowed)
     contest = _contest(pair, poses, scores, pair.guessed_pose, start.searches_everywhere, seed, threads)
+    if start.searches:  # from a confined search, steps may lead out of where it was confined to
+        inside = np.array([pair.is_within(start.angle, pair.motion(G)) for G in poses])
+        poses, scores = (poses[inside], scores[inside]) if inside.any() else (poses, scores)
     contest = replace(contest, other_scale=other_scale)
     clock.lap("anneal")
     refined = [at_copies(pair, refine(pair, G)) for G in _rivals(pair, poses, scores)]
@@ -77,6 +82,11 @@ def register_robust(
     clock.lap("refine")
     best, *others = judged(pair, refined, contest, threads)
     clock.lap("judge")
+    if start.searches and not refined[0].meets and is_for_points(pair, best.reason):
+        by_them = by_points(pair, refined[0], start.angle, seed, threads)
+        if by_them is not refined[0]:
+            best, *others = judged(pair, [by_them], contest, threads)
+        clock.lap("points")
     return replace(best, seconds=clock.laps, alternatives=tuple(others))
 
 

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..clouds.cloud import PointCloud, as_points
 from ..errors import ArgumentError, missing_extra
+from ..motions import angles_between
 from ..whole_file import replacing
 from . import views
 from .painting import SOURCE_COLOR, TARGET_COLOR, Clouds, Window, paint, window_of
@@ -114,7 +115,7 @@ def _below_ceiling(source_heights: Array, target_heights: Array) -> tuple[NDArra
 
 def _motion(T: Array, before: Array, after: Array) -> str:
     """The motion in words; the shift is that of the source's middle, which no far-off origin inflates."""
-    angle = np.degrees(2 * np.arcsin(min(1.0, np.linalg.norm(T[:3, :3] - np.eye(3)) / np.sqrt(8))))
+    angle = np.degrees(angles_between(T, np.eye(4)))
     shift = np.linalg.norm(after.mean(axis=0) - before.mean(axis=0))
     return f"source turned by {angle:.1f}° and moved by {shift:.3g}"
 
