@@ -43,9 +43,20 @@ def window_of(clouds: Clouds, view: Array) -> Window:
 
 def paint(clouds: Clouds, view: Array, window: Window, columns: int) -> Image:
     """The image (rows, columns, 4) of the window, RGBA, white where there is nothing."""
+    seen = np.concatenate(clouds) @ view.T
+    point = visible(seen, window, columns)
+    colors = np.append(_shaded(clouds, seen[:, 2]), np.uint32(2**32 - 1))  # the last one, white, is for -1
+    return np.ascontiguousarray(colors[point]).view(np.uint8).reshape(*point.shape, 4)
+
+
+def visible(seen: Array, window: Window, columns: int, covered: float = _COVERED) -> NDArray[np.int32]:
+    """Which point each pixel of the window shows, (rows, columns); -1: none.
+
+    seen: (N, 3), the points along the view's axes: right, up, to the viewer. covered: the share of the image that the
+    points' discs would cover, side by side.
+    """
     scale = columns / window.width
     rows = round(window.height * scale)
-    seen = np.concatenate(clouds) @ view.T
     x, y = (seen[:, :2] - window.middle).T * scale
     column, row = np.floor(columns / 2 + x), np.floor(rows / 2 - y)
     inside = (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
@@ -53,12 +64,12 @@ def paint(clouds: Clouds, view: Array, window: Window, columns: int) -> Image:
     nearer_last = nearer_last[inside[nearer_last]]
 
     margin = int(_LARGEST)  # so that a disc at the edge needs no test
-    canvas = np.full((rows + 2 * margin, columns + 2 * margin), 2**32 - 1, np.uint32)
+    canvas = np.full((rows + 2 * margin, columns + 2 * margin), -1, np.int32)
     wide = canvas.shape[1]
     middles = ((row + margin) * wide + column + margin)[nearer_last].astype(np.int64)
-    pixels = middles[:, None] + _disc(len(seen), rows * columns) @ (1, wide)
-    canvas.ravel()[pixels] = _shaded(clouds, seen[:, 2])[nearer_last, None]  # of equal pixels the last one stays
-    return canvas[margin:-margin, margin:-margin].copy().view(np.uint8).reshape(rows, columns, 4)
+    pixels = middles[:, None] + _disc(len(seen), covered * rows * columns) @ (1, wide)
+    canvas.ravel()[pixels] = nearer_last[:, None]  # of equal pixels the last one stays
+    return canvas[margin:-margin, margin:-margin].copy()
 
 
 def _shaded(clouds: Clouds, depth: Array) -> NDArray[np.uint32]:
@@ -70,9 +81,9 @@ def _shaded(clouds: Clouds, depth: Array) -> NDArray[np.uint32]:
     return np.asarray(bytes_of_each.view(np.uint32)).ravel()
 
 
-def _disc(points: int, pixels: int) -> NDArray[np.int64]:
-    """The offsets (M, 2) of one point's pixels: more for few points, so that they look like a surface."""
-    radius = np.clip(np.sqrt(_COVERED * pixels / (np.pi * points)), _SMALLEST, _LARGEST)
+def _disc(points: int, pixels: float) -> NDArray[np.int64]:
+    """The offsets (M, 2) of one point's pixels, so that all points together have so many, within bounds."""
+    radius = np.clip(np.sqrt(pixels / (np.pi * points)), _SMALLEST, _LARGEST)
     reach = np.arange(-int(radius), int(radius) + 1)
     offsets = np.stack(np.meshgrid(reach, reach), axis=-1).reshape(-1, 2)
     return np.asarray(offsets[np.sum(offsets**2, axis=1) <= radius**2])
