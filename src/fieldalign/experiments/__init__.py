@@ -13,7 +13,11 @@ __all__ = ["NAMES", "Report", "Request", "run"]
 Run: TypeAlias = Callable[[Request], Report]
 
 # name on the command line: file and function there
-NAMES: dict[str, tuple[str, str]] = {}
+NAMES: dict[str, tuple[str, str]] = {
+    "distance-field": ("distance_field", "distance_field"),
+    "pseudo-sets": ("pseudo_sets", "pseudo_sets"),
+    "data-examples": ("data_examples", "data_examples"),
+}
 
 
 def run(name: str, request: Request) -> Report:
