@@ -7,8 +7,11 @@ suits the set (a room 0.05 m, a street 0.5 m, an object 0.002 m), while fieldali
 peer starts; those that search from any pose ignore it. threads: OMP_NUM_THREADS must say the same, before a peer is
 imported: not all of them can be told otherwise.
 
-TEASER++ is not among them: its Python package is not in the index. KISS-Matcher holds its solver (GNC on translation-
-invariant measurements, graph-theoretic pruning) and comes from the same group.
+Each needs its own package when it is loaded, and no other's. The folder can be imported by its path under any name.
+
+TEASER++ is not among them: no package of the index can be built without GitHub. KISS-Matcher holds its solver (GNC on
+translation-invariant measurements, graph-theoretic pruning) and comes from the same group. PointNetLK-Revisited is run
+from a user's checkout: load("pointnetlk-revisited", checkout=FOLDER).
 """
 
 from __future__ import annotations
@@ -23,11 +26,20 @@ METHODS = {
     "fgr": ("open3d_fgr", "Open3D FPFH + FGR + ICP", {}),
     "gicp": ("gicp", "small_gicp, three levels, from the guess", {}),
     "gicp-fine": ("gicp", "small_gicp, three levels to voxel / 4, from the guess", {"fine": True}),
+    "gicp-plain": ("gicp", "small_gicp, one level, all points, from the guess", {"plain": True}),
     "icp": ("open3d_icp", "Open3D multi-scale ICP, from the guess", {}),
+    "icp-point": ("open3d_plain_icp", "Open3D ICP, point to point, from the guess", {}),
+    "icp-plane": ("open3d_plain_icp", "Open3D ICP, point to plane, from the guess", {"planes": True}),
+    "cpd": ("pycpd_cpd", "pycpd CPD, from the guess", {}),
+    "filterreg": ("probreg_methods", "probreg FilterReg, from the guess", {}),
+    "gmmtree": ("probreg_methods", "probreg GMMTree, from the guess", {"method": "gmmtree"}),
+    "svr": ("probreg_methods", "probreg SVR, from the guess", {"method": "svr"}),
+    "pointnetlk-revisited": ("pointnetlk_revisited", "PointNetLK-Revisited, from the guess", {"checkout": None}),
 }
 
 
-def load(name: str):
-    """The align function of a method; imports its peer."""
+def load(name: str, **given):
+    """The align function of a method; imports its peer. given: options of this call, as checkout=FOLDER of the method
+    that is in no package index."""
     module, _, options = METHODS[name]
-    return partial(import_module(f"{__name__}.{module}").align, **options)
+    return partial(import_module(f"{__name__}.{module}").align, **options | given)

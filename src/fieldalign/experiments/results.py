@@ -126,7 +126,8 @@ def head(name: str, title: str, protocol: Iterable[str], data: Path, seed: int) 
 
 def versions() -> dict[str, str]:
     """Of this project, of what it stands on, and of the peers that are installed."""
-    packages = ("fieldalign", "numpy", "scipy", "small_gicp", "open3d", "kiss-matcher", "kiss-icp", "pycpd", "torch")
+    packages = ("fieldalign", "numpy", "scipy", "small_gicp", "open3d", "kiss-matcher", "kiss-icp", "pycpd", "probreg",
+                "torch")
     return {"python": platform.python_version()} | {name: v for name in packages if (v := _version(name)) is not None}
 
 
