@@ -34,7 +34,9 @@ _HEIGHT = sum(_ROWS) + (len(_ROWS) - 1) * _GAP + _BELOW
 
 def data_examples(request: Request) -> Report:
     """Draws shapes of ModelNet40 and ShapeNet, and pairs of 3DMatch and of KITTI at their true poses."""
-    objects = {"ModelNet40": modelnet.shapes(request.data), "ShapeNet": shapenet.shapes(request.data)}
+    others = shapenet.shapes(request.data)
+    stand_in = others[0].category == "procedural"
+    objects = {"ModelNet40": modelnet.shapes(request.data), "meshes" if stand_in else "ShapeNet": others}
     shapes = {name: _drawn(found, request.seed) for name, found in objects.items()}
     rooms = spread(three_d_match.pairs(request.data)[2:], _PAIRS)
     street = kitti.metres_apart(request.data)[0]
@@ -42,7 +44,7 @@ def data_examples(request: Request) -> Report:
     figure = pictures.new_figure(pictures.COLUMN, _HEIGHT)
     rows = [_row(figure, row, count) for row, count in enumerate((_SHAPES, _SHAPES, _PAIRS, 1))]
     for panels, (name, found) in zip(rows, shapes.items(), strict=False):
-        _name_row(panels[0], "meshes" if found[0].category == "procedural" else name)
+        _name_row(panels[0], name)
         for axes, shape in zip(panels, found, strict=False):
             _draw_shape(axes, shape, request.seed)
     _name_row(rows[2][0], "3DMatch")
