@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 _SURFACE_COLOR, _POINT_COLOR = (0.80, 0.83, 0.87), (0.15, 0.15, 0.17)
 _SOURCE_COLOR, _TARGET_COLOR = (1.0, 0.58, 0.28), (0.42, 0.70, 0.95)  # of painting.py, lighter, since they are shaded
-_SURFACE, _POINTS = 40_000, 700  # points of a mesh's surface, and of those that are drawn black
+_SURFACE, _POINTS = 120_000, 700  # points of a mesh's surface, and of those that are drawn black
 _SHAPES, _PAIRS = 4, 2  # in a row
 _STREET = 42.0, 20.0  # metres along and across the drive that are shown, to either side of the sensor
 _LEFT, _GAP, _BELOW = 0.17, 0.04, 0.05  # inches: for the rows' names, between panels, below them
