@@ -23,7 +23,8 @@ from .executors import bar, chosen_executor, executor_options
 @click.option("--columns", help="Measure these methods only, by name, with commas between them.")
 @click.option("--pointnetlk-revisited", "pointnetlk", type=click.Path(exists=True, file_okay=False),
               help="A checkout of PointNetLK-Revisited with its weights, to be measured, too (with --peers).")
-@click.option("--limit", type=click.IntRange(min=1), help="At most so many cases, spread evenly.")
+@click.option("--limit", type=click.IntRange(min=1),
+              help="At most so many cases, spread evenly; by default all, of ../shared/data as many as take minutes.")
 @executor_options
 def command(
     name: str,
@@ -52,7 +53,7 @@ def command(
         report = run(name, Request(
             Path(data), folder, executor, seed, limit, None if columns is None else tuple(columns.split(",")),
             None if peers is None else Path(peers), checkouts,
-            Path(run_folder) if run_folder else folder / f"{name}.run", tell,
+            Path(run_folder) if run_folder else None, tell,
         ))
     click.echo(report.text)
     for file in report.files:

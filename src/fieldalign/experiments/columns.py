@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Iterable, Mapping
+from contextlib import closing
 from dataclasses import dataclass
 from functools import cache
 from importlib.util import module_from_spec, spec_from_file_location
@@ -14,11 +15,14 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from ..assembly.executor import Processes, Task
 from ..errors import ArgumentError
 from ..fields.protocol import Floats
 from ..motions import Matrix
 from ..register import register
 from ..settings import Settings
+
+_faults: dict[ByPeer, str | None] = {}  # of peers that were tried
 
 
 class Answer(NamedTuple):
@@ -101,6 +105,25 @@ def peers_in(folder: Path, names: Iterable[str], checkouts: Mapping[str, Path]) 
     methods = _adapters(str(folder.absolute())).METHODS
     needs = {name for name, (_, _, options) in methods.items() if options.get("checkout", "") is None}
     return {name: methods[name][1] for name in names if name in methods and (name not in needs or name in checkouts)}
+
+
+def unloadable(peers: Iterable[ByPeer]) -> dict[str, str]:
+    """Why peers cannot be loaded here, by name: a package is missing. Asked once, in a process of its own, since what
+    they load is heavy, and may take a number of threads only once."""
+    named = {peer.name: peer for peer in peers}
+    tasks = [Task(name, (), peer) for name, peer in named.items() if peer not in _faults]
+    if tasks:
+        with closing(Processes(1).run(_fault_of, tasks, {})) as answers:
+            _faults.update({named[done.key]: done.error or done.value for done in answers})
+    return {name: fault for name, peer in named.items() if (fault := _faults[peer]) is not None}
+
+
+def _fault_of(peer: ByPeer, load: object) -> str | None:
+    try:
+        _peer(peer.folder, peer.name, peer.checkout, 1)
+    except ImportError as error:
+        return str(error)
+    return None
 
 
 @cache

@@ -11,8 +11,10 @@ from ..assembly.record import RunRecord
 from ..assembly.work import Task
 from ..errors import ArgumentError
 from . import results
+from .alone import telling
 from .case import Case, spread
-from .columns import ByPeer, Column, peers_in
+from .columns import ByPeer, Column, peers_in, unloadable
+from .data_sets.files import is_part
 from .request import Report, Request
 from .results import Results, Row
 from .trial import Trial
@@ -28,9 +30,11 @@ class Comparison:
     voxel: the length that peers are told. from_guess: whether peers start from each case's guess, or from the
         centroids laid on each other.
     success: degrees and length within which a registration is right.
-    symmetric: whether shapes may be like themselves when they are turned.
     text: text(results), the table and what stands below it.
     draw: draw(results, path), the picture; None: none.
+    few: how many cases are run of this project's part of the data where no limit is given; None: all.
+    trial: the work on one case by one method.
+    record: the experiment whose cases these are, so that its record serves for both; None: its own.
     """
 
     name: str
@@ -44,7 +48,9 @@ class Comparison:
     text: Callable[[Results], str]
     draw: Callable[[Results, Path], None] | None = None
     from_guess: bool = False
-    symmetric: bool = False
+    few: int | None = None
+    trial: type[Trial] = Trial
+    record: str | None = None
 
     def __call__(self, request: Request) -> Report:
         """Runs it: NAME.json with every pair, NAME.md with the table, NAME.png where there is a picture."""
@@ -52,7 +58,7 @@ class Comparison:
         path = request.output / self.name
         text = self.text(measured)
         files = [results.write_json(measured.to_dict(), path.with_suffix(".json")),
-                 results.write_text(_page(self, measured, text), path.with_suffix(".md"))]
+                 results.write_text(results.page(measured.head, text, len(measured.cases)), path.with_suffix(".md"))]
         if self.draw is not None:
             self.draw(measured, path.with_suffix(".png"))
             files.append(path.with_suffix(".png"))
@@ -60,57 +66,55 @@ class Comparison:
 
     def measure(self, request: Request) -> Results:
         """Every case by every method; what the run folder holds is not done again."""
-        cases = spread(self.cases(request.data, request.seed), request.limit)
-        columns = self._columns(request)
+        cases = spread(self.cases(request.data, request.seed), self._limit(request))
+        columns, faults = self._columns(request)
         rows = self._rows(request, cases, columns)
         titles = {column.name: column.title for column in columns}
         head = results.head(self.name, self.title, self.protocol, request.data, request.seed)
-        return Results(cases, titles, rows, self.success, request.seed, head)
+        return Results(cases, titles, rows, self.success, request.seed, head | {"not_measured": faults})
 
-    def _columns(self, request: Request) -> list[Column]:
-        """The methods that are asked for and can be had; raises ArgumentError for a name of none."""
-        columns = {column.name: column for column in self.own}
-        if request.peers is not None:
-            titles = peers_in(request.peers, (*self.peers, *request.checkouts), request.checkouts)
-            for name, title in titles.items():
-                checkout = request.checkouts.get(name)
-                align = ByPeer(str(request.peers.absolute()), name, self.voxel, self.from_guess,
-                               None if checkout is None else str(checkout.absolute()))
-                columns[name] = Column(name, title, align)
+    def _limit(self, request: Request) -> int | None:
+        return self.few if request.limit is None and is_part(request.data) else request.limit
+
+    def _columns(self, request: Request) -> tuple[list[Column], dict[str, str]]:
+        """The methods that are asked for, and why some cannot be had; raises ArgumentError for a name of none."""
+        peers = self._peers(request)
+        columns = {column.name: column for column in (*self.own, *peers.values())}
         chosen = columns if request.columns is None else request.columns
         if unknown := [name for name in chosen if name not in columns]:
             raise ArgumentError(f"columns must be of {', '.join(columns)}, but {unknown[0]!r} is none"
                                 + ("" if request.peers else "; other people's methods need --peers FOLDER"))
-        return [columns[name] for name in chosen]
+        faults = unloadable(align for name in chosen if isinstance(align := columns[name].align, ByPeer))
+        return [columns[name] for name in chosen if name not in faults], faults
+
+    def _peers(self, request: Request) -> dict[str, Column]:
+        """Other people's methods that the experiment is for, as far as the folder has them."""
+        if request.peers is None:
+            return {}
+        folder, checkouts = str(request.peers.absolute()), request.checkouts
+        titles = peers_in(request.peers, (*self.peers, *checkouts), checkouts)
+        return {
+            name: Column(name, title, ByPeer(folder, name, self.voxel, self.from_guess,
+                                             str(checkouts[name].absolute()) if name in checkouts else None))
+            for name, title in titles.items()
+        }
 
     def _rows(self, request: Request, cases: list[Case], columns: list[Column]) -> dict[tuple[str, str], Row]:
         """By (case, method); cases in turn, so that a noisy moment of the machine hits all methods alike."""
         names = {f"{case.name}|{column.name}": (case, column) for case in cases for column in columns}
-        trial = Trial(request.executor.threads, request.seed, self.symmetric)
-        run = {"experiment": self.name, "data": str(request.data.absolute()), "seed": request.seed}
+        run = {"experiment": self.record or self.name, "data": str(request.data.absolute()), "seed": request.seed}
+        trial = self.trial(request.executor.threads, request.seed, repr(run))
+        folder = request.run_folder or request.output / f"{run['experiment']}.run"
         methods = {column.name: repr(column.align) for column in columns}
-        found: dict[str, Row] = {}
         with ExitStack() as opened:
-            record = None
-            if request.run_folder is not None:
-                record = opened.enter_context(RunRecord(request.run_folder, run, methods))
-                found = {key: record.done[key] for key in names if key in record.done}
+            record = opened.enter_context(RunRecord(folder, run, methods))
+            found: dict[str, Row] = {key: record.done[key] for key in names if key in record.done}
             tasks = [Task(key, (), data) for key, data in names.items() if key not in found]
             request.tell(self.name, 0, len(tasks))
+            opened.enter_context(telling(trial.threads))
             work = opened.enter_context(closing(request.executor.run(trial, tasks, {}))) if tasks else ()
             for finished, done in enumerate(work, 1):
                 found[done.key] = done.value if done.error is None else {"error": done.error}
-                if record is not None:
-                    record.add(done.key, found[done.key])
+                record.add(done.key, found[done.key])
                 request.tell(self.name, finished, len(tasks))
         return {(case.name, column.name): found[key] for key, (case, column) in names.items()}
-
-
-def _page(experiment: Comparison, measured: Results, text: str) -> str:
-    """The table as a page: what was done, on what, and what came of it."""
-    head = measured.head
-    made = ", ".join(f"{name} {number}" for name, number in head["versions"].items())
-    return "\n".join([
-        f"# {experiment.title}", "", *(f"- {sentence}" for sentence in experiment.protocol), "", text, "",
-        f"{len(measured.cases)} registrations, seed {head['seed']}, {head['machine']}, {head['date']}; {made}.", "",
-    ])

@@ -19,11 +19,13 @@ class Request:
     data: the folder of the data set, in its published layout, or ../shared/data of this project's checkouts.
     output: the folder of the results, which exists.
     executor: where the work runs. seed: of every random draw.
-    limit: at most so many cases, spread evenly over all that there are; None: all.
+    limit: at most so many cases, spread evenly over all that there are; None: all, or as many as the experiment takes
+        of this project's part of the data.
     columns: the methods to measure, by name; None: all that the experiment is for.
     peers: a folder with adapters of other people's methods (benchmarks/peers of the checkout); None: none.
     checkouts: of methods that are not in the package index, by name: the folder with their code and weights.
-    run_folder: where each result is recorded at once, and from which an interrupted run goes on.
+    run_folder: where each result is recorded at once, and from which an interrupted run goes on; None: NAME.run in
+        output.
     tell: is told how far the work is.
     """
 

@@ -59,17 +59,27 @@ class Results:
         kinds = [key for key in ("rre_deg", "rte", "rre_modulo_deg", "rte_modulo") if given and key in given[0][1]]
         found: dict[str, Any] = {"cases": len(rows), "without_pose": len(rows) - len(given)}
         found |= {key: measures.summary(_finite(self.values(key, method, group)), self.seed) for key in kinds}
-        found["success"] = measures.share(self.successes(method, group), self.seed)
+        found["success"] = measures.share(self.successes(method, group))
+        if "rre_modulo_deg" in kinds:
+            found["success_modulo"] = measures.share(self.successes(method, group, modulo=True))
         if given:
             found |= _pooled(given)
             found |= {key: float(np.median([row[key] for _, row in given])) for key in ("seconds", "cpu_seconds")}
         return found | self._trust(method, group)
 
-    def successes(self, method: str, group: str | None = None, modulo: bool = False) -> NDArray[np.bool_]:
-        """Whether each case is right, (n,)."""
-        degrees, lengths = ("rre_modulo_deg", "rte_modulo") if modulo else ("rre_deg", "rte")
-        within = self.values(degrees, method, group) <= self.success[0]
-        return np.asarray(within & (self.values(lengths, method, group) <= self.success[1]))
+    def successes(
+        self, method: str, group: str | None = None, modulo: bool = False, within: tuple[float, float] | None = None
+    ) -> NDArray[np.bool_]:
+        """Whether each case is right, (n,). modulo: symmetries of the shape. within: other bounds than `success`."""
+        names = ("rre_modulo_deg", "rte_modulo") if modulo else ("rre_deg", "rte")
+        degrees, lengths = (self.values(name, method, group) for name in names)
+        bounds = self.success if within is None else within
+        return np.asarray((degrees <= bounds[0]) & (lengths <= bounds[1]))
+
+    @property
+    def modulo(self) -> bool:
+        """Whether errors are given modulo the shapes' symmetries, too."""
+        return any(case.shape is not None for case in self.cases)
 
     def _trust(self, method: str, group: str | None) -> dict[str, Any]:
         """Of a method that judges itself: how many it accepts, and how many of these are wrong."""
@@ -122,6 +132,16 @@ def head(name: str, title: str, protocol: Iterable[str], data: Path, seed: int) 
         "experiment": name, "title": title, "protocol": list(protocol), "data": str(data), "seed": seed,
         "versions": versions(), "machine": machine(), "date": datetime.now(UTC).isoformat("T", "seconds"),
     }
+
+
+def page(head: Mapping[str, Any], text: str, count: int) -> str:
+    """A table as a page in Markdown: what was done, on what, and what came of it."""
+    faults = [f"Not measured: {name} ({fault})." for name, fault in head.get("not_measured", {}).items()]
+    made = ", ".join(f"{name} {number}" for name, number in head["versions"].items())
+    return "\n".join([
+        f"# {head['title']}", "", *(f"- {sentence}" for sentence in head["protocol"]), "", text, "", *faults,
+        f"{count} registrations by each method, seed {head['seed']}, {head['machine']}, {head['date']}; {made}.", "",
+    ])
 
 
 def versions() -> dict[str, str]:

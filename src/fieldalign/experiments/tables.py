@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+import numpy as np
+
+from .published import Published
 from .results import Results
 
 Cell = str | float | int | None
@@ -32,14 +35,14 @@ def number(value: float | None, digits: int = 3) -> str:
 
 def accuracy(results: Results, unit: str = "", group: str | None = None, pooled: bool = False) -> str:
     """The table of a group of cases (None: all), a row for each method. pooled: with the pooled Euler measure, too."""
-    modulo = any("rre_modulo_deg" in row for row in results.rows.values())
     in_unit = f" ({unit})" if unit else ""
+    within = f"within {results.success[0]:g} deg, {results.success[1]:g} {unit}".rstrip()
     header = ["method", "RRE RMSE (deg)", "RRE median", f"RTE RMSE{in_unit}", "RTE median"]
-    header += ["RRE RMSE modulo symmetry", "RTE RMSE modulo symmetry"] if modulo else []
     header += ["Euler RMSE (deg)", "Euler median", "shift RMSE, by component", "shift median"] if pooled else []
-    header += [f"within {results.success[0]:g} deg, {results.success[1]:g} {unit}".rstrip(), "CPU ms"]
-    return as_markdown(header, [
-        _row(title, results.summary(method, group), modulo, pooled) for method, title in results.titles.items()
+    header += [within]
+    header += ["RRE RMSE modulo symmetry", "RTE RMSE modulo symmetry", f"{within}, modulo symmetry"] * results.modulo
+    return as_markdown([*header, "CPU ms"], [
+        _row(title, results.summary(method, group), results.modulo, pooled) for method, title in results.titles.items()
     ])
 
 
@@ -50,14 +53,52 @@ def _row(title: str, found: dict[str, Any], modulo: bool, pooled: bool) -> list[
     cells: list[Cell] = [title]
     for kind in ("rre_deg", "rte"):
         cells += [_with_interval(found.get(kind)), found[kind]["median"] if kind in found else None]
-    if modulo:
-        cells += [_with_interval(found.get(kind)) for kind in ("rre_modulo_deg", "rte_modulo")]
     if pooled:
         for kind in ("euler_deg", "translation_components"):
             cells += [found.get(kind, {}).get(measure) for measure in ("rmse", "median")]
-    share, (low, high) = found["success"]["share"], found["success"]["interval"]
-    milliseconds = 1e3 * found["cpu_seconds"] if "cpu_seconds" in found else None
-    return [*cells, f"{share:.3f} ({low:.3f}-{high:.3f})", milliseconds]
+    cells += [share_cell(found["success"])]
+    if modulo:
+        cells += [_with_interval(found.get(kind)) for kind in ("rre_modulo_deg", "rte_modulo")]
+        cells += [share_cell(found.get("success_modulo"))]
+    return [*cells, 1e3 * found["cpu_seconds"] if "cpu_seconds" in found else None]
+
+
+def by_group(results: Results, axis: str, within: tuple[float, float] | None = None) -> str:
+    """The share of successes of every method in every group; axis: what the groups differ by."""
+    return as_markdown([axis, *results.groups], [
+        [title, *(float(results.successes(method, group, results.modulo, within).mean()) for group in results.groups)]
+        for method, title in results.titles.items()
+    ])
+
+
+def by_threshold(results: Results, thresholds: Sequence[tuple[float, float]]) -> str:
+    """The share of successes of every method within several errors of rotation (degrees), and of translation."""
+    header = [f"{degrees:g} deg" for degrees, _ in thresholds] + [f"{length:g}" for _, length in thresholds]
+    bounds = [(degrees, np.inf) for degrees, _ in thresholds] + [(np.inf, length) for _, length in thresholds]
+    return as_markdown(["method", *header], [
+        [title, *(float(results.successes(method, within=within).mean()) for within in bounds)]
+        for method, title in results.titles.items()
+    ])
+
+
+def published(entries: Iterable[Published]) -> str:
+    """Figures that others have published, a table for each kind of figures."""
+    kinds: dict[tuple[str, ...], list[Published]] = {}
+    for entry in entries:
+        kinds.setdefault(tuple(entry.figures), []).append(entry)
+    return "\n\n".join(
+        as_markdown(["published", *(name.replace("_", " ") for name in names), "source"],
+                    [[entry.method, *entry.figures.values(), entry.source] for entry in alike])
+        for names, alike in kinds.items()
+    )
+
+
+def share_cell(found: dict[str, Any] | None) -> str:
+    """A share and its 95 % interval."""
+    if not found or found["share"] is None:
+        return ""
+    low, high = found["interval"]
+    return f"{found['share']:.3f} ({low:.3f}-{high:.3f})"
 
 
 def _with_interval(found: dict[str, Any] | None) -> str:
@@ -65,4 +106,4 @@ def _with_interval(found: dict[str, Any] | None) -> str:
     if not found or found["rmse"] is None:
         return ""
     low, high = found["rmse_interval"]
-    return f"{number(found['rmse'])} ({number(low)}-{number(high)})"
+    return f"{number(found['rmse'])} ({number(low, 2)}-{number(high, 2)})"

@@ -36,6 +36,11 @@ def first_of(read: Callable[..., list[T]], places: Iterable[Path], *args: object
     return next((found for place in places if (found := read(place, *args))), [])
 
 
+def is_part(folder: PathLike) -> bool:
+    """Whether this is the folder of this project's part of the data sets, ../shared/data."""
+    return Path(folder, "paper_pairs").is_dir()
+
+
 def nothing_of(data_set: str, place: Path, layouts: Iterable[str]) -> DataSetError:
     """The error for a folder that holds nothing of a data set: it names what was looked for."""
     return DataSetError(f"{place} holds nothing of {data_set}; looked for " + ", or ".join(layouts))
@@ -84,5 +89,3 @@ def arrays_in(file: Path, *names: str) -> list[NDArray[Any]]:
         raise DataSetError(f"{file} must hold the arrays {', '.join(names)}, but has no {error.args[0]}") from error
     except Exception as error:
         raise DataSetError(f"{file} cannot be read as .npz: {error}") from error
-
-
