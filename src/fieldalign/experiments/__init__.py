@@ -14,6 +14,12 @@ Run: TypeAlias = Callable[[Request], Report]
 
 # name on the command line: file and function there
 NAMES: dict[str, tuple[str, str]] = {
+    "modelnet40": ("accuracy", "MODELNET40"),
+    "shapenet": ("accuracy", "SHAPENET"),
+    "success-rate": ("accuracy", "SUCCESS_RATE"),
+    "efficiency": ("efficiency", "efficiency"),
+    "density": ("robustness", "DENSITY"),
+    "noise": ("robustness", "NOISE"),
     "distance-field": ("distance_field", "distance_field"),
     "pseudo-sets": ("pseudo_sets", "pseudo_sets"),
     "data-examples": ("data_examples", "data_examples"),
