@@ -103,7 +103,7 @@ SUCCESS_RATE = replace(
     title="Figure: share of successes against the error threshold, on ModelNet40",
     protocol=(
         "The registrations of the experiment modelnet40: what was recorded there is not done again.",
-        *MODELNET40.protocol[:-1], "The bands are 95 % intervals (Wilson).",
+        *MODELNET40.protocol[:-1], "The bands are 95 % intervals (Wilson) of the first four methods.",
     ),
     text=_table_of_shares, draw=curves.draw_success, record="modelnet40",
 )

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 _PANEL, _LINE = 1.9, 0.13  # inches: the heights of a panel and of a legend's line
 _STEPS = 200
+_BANDS = 4  # of the methods, the first, which are this project's, are drawn with their intervals: more hide each other
 _SMALLEST = 1e-8  # degrees, and of a length a hundredth: below lies the rounding of numbers
 # Of Okabe and Ito: told apart by every kind of colour vision; the first are this project's.
 _COLORS = ("#D55E00", "#0072B2", "#009E73", "#CC79A7", "#000000", "#E69F00", "#56B4E9", "#8C6D00")
@@ -85,7 +86,7 @@ def draw_line(
     """One method's line; number: which color and dashes it has. band: its interval."""
     color, dashes = _COLORS[number % len(_COLORS)], _DASHES[number % len(_DASHES)]  # where two are one, both are seen
     axes.plot(x, y, color=color, linestyle=dashes, linewidth=1.0, label=title, markersize=2.0, **how)
-    if band is not None:
+    if band is not None and number < _BANDS:
         axes.fill_between(x, *band, color=color, alpha=0.08, linewidth=0)
 
 

@@ -35,7 +35,7 @@ _MOTIONS = (
 _THRESHOLD = (
     "The paper does not say what counts as a success: here, modulo the shape's symmetries, what is within 1 degree and "
     "0.01 (the rim of the shape is off by 1 % of its size), and beside it within 5 degrees and 0.05, from where a "
-    "refinement on denser data would go on. Bands are 95 % intervals (Wilson)."
+    "refinement on denser data would go on. Bands are 95 % intervals (Wilson) of the first four methods."
 )
 
 
