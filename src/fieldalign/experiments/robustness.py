@@ -134,7 +134,7 @@ DENSITY = Comparison(
         _MOTIONS, objects.GUESS, _THRESHOLD,
     ),
     cases=_thinned, own=(objects.PRIOR, objects.ANY_POSE, objects.PAPER, objects.PAPER_NEAR), peers=objects.SOME_PEERS,
-    voxel=objects.VOXEL, success=objects.NEAR, text=_table_of_density, draw=_draw_density, few=60,
+    voxel=objects.VOXEL, success=objects.NEAR, text=_table_of_density, draw=_draw_density, few=50,
 )
 
 NOISE = replace(
