@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +16,7 @@ from .case import Case, spread
 from .columns import ByPeer, Column, peers_in, unloadable
 from .data_sets.files import is_part
 from .request import Report, Request
-from .results import Results, Row
+from .results import Further, Results, Row
 from .trial import Trial
 
 
@@ -35,6 +35,7 @@ class Comparison:
     few: how many cases are run of this project's part of the data where no limit is given; None: all.
     trial: the work on one case by one method.
     record: the experiment whose cases these are, so that its record serves for both; None: its own.
+    further: what else each method is measured by, see Results; None: nothing.
     """
 
     name: str
@@ -51,6 +52,7 @@ class Comparison:
     few: int | None = None
     trial: type[Trial] = Trial
     record: str | None = None
+    further: Further | None = None
 
     def __call__(self, request: Request) -> Report:
         """Runs it: NAME.json with every pair, NAME.md with the table, NAME.png where there is a picture."""
@@ -67,23 +69,23 @@ class Comparison:
     def measure(self, request: Request) -> Results:
         """Every case by every method; what the run folder holds is not done again."""
         cases = spread(self.cases(request.data, request.seed), self._limit(request))
-        columns, faults = self._columns(request)
+        columns, faults = self._chosen(request)
         rows = self._rows(request, cases, columns)
         titles = {column.name: column.title for column in columns}
         head = results.head(self.name, self.title, self.protocol, request.data, request.seed)
-        return Results(cases, titles, rows, self.success, request.seed, head | {"not_measured": faults})
+        return Results(cases, titles, rows, self.success, request.seed, head | {"not_measured": faults}, self.further)
 
     def _limit(self, request: Request) -> int | None:
         return self.few if request.limit is None and is_part(request.data) else request.limit
 
-    def _columns(self, request: Request) -> tuple[list[Column], dict[str, str]]:
+    def columns(self, request: Request) -> dict[str, Column]:
+        """The methods that can be asked for, by name."""
+        return {column.name: column for column in self.own} | self._peers(request)
+
+    def _chosen(self, request: Request) -> tuple[list[Column], dict[str, str]]:
         """The methods that are asked for, and why some cannot be had; raises ArgumentError for a name of none."""
-        peers = self._peers(request)
-        columns = {column.name: column for column in (*self.own, *peers.values())}
-        chosen = columns if request.columns is None else request.columns
-        if unknown := [name for name in chosen if name not in columns]:
-            raise ArgumentError(f"columns must be of {', '.join(columns)}, but {unknown[0]!r} is none"
-                                + ("" if request.peers else "; other people's methods need --peers FOLDER"))
+        columns = self.columns(request)
+        chosen = asked_of(columns, request)
         faults = unloadable(align for name in chosen if isinstance(align := columns[name].align, ByPeer))
         return [columns[name] for name in chosen if name not in faults], faults
 
@@ -118,3 +120,12 @@ class Comparison:
                 record.add(done.key, found[done.key])
                 request.tell(self.name, finished, len(tasks))
         return {(case.name, column.name): found[key] for key, (case, column) in names.items()}
+
+
+def asked_of(known: Collection[str], request: Request) -> list[str]:
+    """The names of methods that are asked for; raises ArgumentError for one that is not known."""
+    names = list(known) if request.columns is None else list(request.columns)
+    if unknown := [name for name in names if name not in known]:
+        raise ArgumentError(f"columns must be of {', '.join(known)}, but {unknown[0]!r} is none"
+                            + ("" if request.peers else "; other people's methods need --peers FOLDER"))
+    return names

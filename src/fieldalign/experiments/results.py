@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 import os
 import platform
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from . import measures
 from .case import Case
 
 Row = Mapping[str, Any]
+Further: TypeAlias = "Callable[[Results, str, str | None], dict[str, Any]]"
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +30,7 @@ class Results:
 
     cases: in their order. titles: of the methods, by name. rows: by (case, method); of a method that raised, its
     sentence as "error". success: within so many degrees, and so far. head: protocol, versions, machine.
+    further: further(results, method, group), what else a method is measured by; it joins the summary.
     """
 
     cases: list[Case]
@@ -37,6 +39,7 @@ class Results:
     success: tuple[float, float]
     seed: int
     head: dict[str, Any]
+    further: Further | None = None
 
     @property
     def groups(self) -> list[str]:
@@ -65,6 +68,7 @@ class Results:
         if given:
             found |= _pooled(given)
             found |= {key: float(np.median([row[key] for _, row in given])) for key in ("seconds", "cpu_seconds")}
+        found |= {} if self.further is None else self.further(self, method, group)
         return found | self._trust(method, group)
 
     def successes(
@@ -134,12 +138,12 @@ def head(name: str, title: str, protocol: Iterable[str], data: Path, seed: int) 
     }
 
 
-def page(head: Mapping[str, Any], text: str, count: int) -> str:
-    """A table as a page in Markdown: what was done, on what, and what came of it."""
+def page(head: Mapping[str, Any], text: str, count: int, heading: str = "#") -> str:
+    """A table as a page in Markdown, or a part of one: what was done, on what, and what came of it."""
     faults = [f"Not measured: {name} ({fault})." for name, fault in head.get("not_measured", {}).items()]
     made = ", ".join(f"{name} {number}" for name, number in head["versions"].items())
     return "\n".join([
-        f"# {head['title']}", "", *(f"- {sentence}" for sentence in head["protocol"]), "", text, "", *faults,
+        f"{heading} {head['title']}", "", *(f"- {sentence}" for sentence in head["protocol"]), "", text, "", *faults,
         f"{count} registrations by each method, seed {head['seed']}, {head['machine']}, {head['date']}; {made}.", "",
     ])
 

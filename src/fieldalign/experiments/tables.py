@@ -101,6 +101,16 @@ def share_cell(found: dict[str, Any] | None) -> str:
     return f"{found['share']:.3f} ({low:.3f}-{high:.3f})"
 
 
+def medians(found: dict[str, Any]) -> list[Cell]:
+    """Of RRE and RTE, over all cases with a pose."""
+    return [found[kind]["median"] if kind in found else None for kind in ("rre_deg", "rte")]
+
+
+def trusted(found: dict[str, Any]) -> str:
+    """Of a method that judges itself: how many answers it accepts, and how many of these are wrong."""
+    return f"{found['accepted']} ({found['accepted_wrong']})" if "accepted" in found else ""
+
+
 def _with_interval(found: dict[str, Any] | None) -> str:
     """An RMSE and its 95 % interval."""
     if not found or found["rmse"] is None:
