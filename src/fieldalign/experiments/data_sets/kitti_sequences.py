@@ -62,6 +62,11 @@ class ScanPair:
         """SEQUENCE/i_j."""
         return f"{self.sequence}/{self.i}_{self.j}"
 
+    @property
+    def group(self) -> str:
+        """What its results are summed up with: the sequence."""
+        return self.sequence
+
     def clouds(self) -> tuple[Matrix, Matrix]:
         """The points of source and target, (N, 3) and (M, 3) float64; raises CloudFileError where a file has none."""
         return points_of(self.source), points_of(self.target)

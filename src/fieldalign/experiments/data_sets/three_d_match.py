@@ -84,6 +84,11 @@ class FragmentPair:
     i: int | None = None
     j: int | None = None
 
+    @property
+    def group(self) -> str:
+        """What its results are summed up with: the scene."""
+        return self.scene
+
     def clouds(self) -> tuple[Matrix, Matrix]:
         """The points of source and target, (N, 3) and (M, 3) float64; raises CloudFileError where a file has none."""
         return points_of(self.source), points_of(self.target)
@@ -120,6 +125,17 @@ def overlap_of(pair: FragmentPair, distance: float = 0.03, voxel: float = 0.01, 
     cores = resolve_threads(threads)
     away, _ = _core.PointTree(apply(pair.T_target_source, source), cores).nearest(target, 1, cores)
     return float((away <= distance).mean())
+
+
+def demo_pair(folder: PathLike) -> FragmentPair:
+    """The pair of PointNetLK-Revisited's demonstration in `pointnetlk`: demo_pair.npz, whose p1 is the source, at the
+    pose of demo_target_from_source_icp.npy, where the surfaces agree. Raises DataSetError where it is not there."""
+    place = as_folder(folder)
+    file, pose = (place / "pointnetlk" / name for name in ("demo_pair.npz", "demo_target_from_source_icp.npy"))
+    if not (file.is_file() and pose.is_file()):
+        raise nothing_of("PointNetLK-Revisited's demonstration", place, (f"pointnetlk/{file.name} and {pose.name}",))
+    T = as_rigid(np.load(pose, allow_pickle=False), str(pose))
+    return FragmentPair("demo", "pointnetlk/demo_pair", f"{file}#p1", f"{file}#p0", T)
 
 
 # ------------------------------------------------------------------------------------------------------ the benchmark
