@@ -13,39 +13,25 @@ import json
 import os
 import platform
 import time
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 import fieldalign as fa
 from fieldalign.evaluation import rotation_error, translation_error
+from fieldalign.experiments.ablation import ROWS, row_settings
+from fieldalign.experiments.published import ABLATION, PROGRAM_ABLATION
 from fieldalign.motions import apply, exp_twist
 
 DATA = Path(os.environ.get("FIELDALIGN_DATA", Path(__file__).parents[2] / "shared" / "data"))
 
-# Row: IRLS, truncation, pseudo set; median degrees in the paper's Table IV (all of 3DMatch) and of the authors' program
-# on this pair, thinned at 5 cm and at full resolution.
-ROWS = {
-    8: (True, True, "neighbourhood", 0.913, 0.79, 0.75),
-    4: (False, True, "neighbourhood", 2.998, 1.67, 2.05),
-    7: (True, True, "uniform", 4.687, 2.22, 3.26),
-    6: (True, False, "neighbourhood", 4.443, 3.11, 3.92),
-    5: (True, False, "uniform", 5.732, 4.64, 4.43),
-    2: (False, False, "neighbourhood", 7.393, 7.9, 8.4),
-    3: (False, True, "uniform", 7.503, 12.1, 12.1),
-    1: (False, False, "uniform", 7.073, 12.2, 12.4),
-}
+ORDER = 8, 4, 7, 6, 5, 2, 3, 1  # of Table IV's rows, by their median
+PAPER = {row.method: row.figures["rotation_median_deg"] for row in ABLATION}
+PROGRAM = {row.method: row.figures for row in PROGRAM_ABLATION}
 WITHOUT_UNIQUE_ANSWER = """
     l_sphere t_ico4 t_ico4uv t_sphere t_unit_sphere t_torus t_capsule t_round t_ballA t_ballB l_halftunnel l_cube_40k
     l_bumpy-cube t_box t_octagonal_pocket t_soup
 """.split()  # noqa: SIM905
-
-
-def row_settings(number: int) -> fa.Settings:
-    irls, truncation, pseudo_set, *_ = ROWS[number]
-    rules = {} if truncation else {"share_limit": None, "direction": "none"}
-    return replace(fa.PRESETS["indoor"], irls=irls, pseudo_set=pseudo_set, **rules)
 
 
 # ------------------------------------------------------------------------------------------------ accuracy
@@ -57,7 +43,7 @@ def ablation(motions: int, seeds: int) -> list[dict]:
     target, source = (pair[name].astype(float) for name in ("p0", "p1"))
     truth = np.load(DATA / "pointnetlk" / "demo_target_from_source_icp.npy")
     moves = np.load(DATA / "paper_pairs" / "demo_perturb100.npy")[:motions]
-    settings = {f"row {n}": row_settings(n) for n in ROWS} | {"indoor-dense": fa.PRESETS["indoor-dense"]}
+    settings = {f"row {n}": row_settings(n) for n in ORDER} | {"indoor-dense": fa.PRESETS["indoor-dense"]}
     rows = []
     for density in ("thinned", "full"):
         clouds = [fa.thin(c, 0.05).points if density == "thinned" else c for c in (target, source)]
@@ -213,8 +199,9 @@ def as_markdown(results: dict) -> str:
               "| <1 deg, 5 cm | program, this pair | paper, 3DMatch |", "| --- |" + " --- |" * 10]
     for row in results["ablation"]:
         number = int(row["setting"].split()[1]) if row["setting"].startswith("row") else None
-        irls, truncation, pseudo_set, paper, thinned, full = ROWS.get(number, (True, True, "neighbourhood", "", "", ""))
-        program = thinned if row["density"] == "thinned" else full
+        irls, truncation, pseudo_set = ROWS[number or 8]
+        paper = PAPER.get(row["setting"], "")
+        program = PROGRAM.get(row["setting"], {}).get(f"rre_median_deg_{row['density']}", "")
         low, high = min(row["median_deg_by_seed"]), max(row["median_deg_by_seed"])
         lines.append(
             f"| {number or row['setting']} | {'yes' if irls else 'no'} | {'yes' if truncation else 'no'} "
