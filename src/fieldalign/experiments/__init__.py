@@ -23,6 +23,10 @@ NAMES: dict[str, tuple[str, str]] = {
     "distance-field": ("distance_field", "distance_field"),
     "pseudo-sets": ("pseudo_sets", "pseudo_sets"),
     "data-examples": ("data_examples", "data_examples"),
+    "3dmatch": ("three_d_match", "EXPERIMENT"),
+    "kitti": ("kitti", "EXPERIMENT"),
+    "kitti-trajectory": ("kitti_trajectory", "run"),
+    "ablation": ("ablation", "EXPERIMENT"),
 }
 
 

@@ -102,7 +102,7 @@ def peers_in(folder: Path, names: Iterable[str], checkouts: Mapping[str, Path]) 
 
     Raises ArgumentError for a folder without adapters.
     """
-    methods = _adapters(str(folder.absolute())).METHODS
+    methods = adapters(str(folder.absolute())).METHODS
     needs = {name for name, (_, _, options) in methods.items() if options.get("checkout", "") is None}
     return {name: methods[name][1] for name in names if name in methods and (name not in needs or name in checkouts)}
 
@@ -127,7 +127,7 @@ def _fault_of(peer: ByPeer, load: object) -> str | None:
 
 
 @cache
-def _adapters(folder: str) -> ModuleType:
+def adapters(folder: str) -> ModuleType:
     """The package of adapters in a folder: METHODS, name -> (module, title, options), and load(name, **options)."""
     init = Path(folder, "__init__.py")
     if not init.is_file():
@@ -146,4 +146,4 @@ def _adapters(folder: str) -> ModuleType:
 def _peer(folder: str, name: str, checkout: str | None, threads: int) -> Any:
     """The align function of a peer; not all of them can be told a number of threads otherwise, and only before."""
     os.environ["OMP_NUM_THREADS"] = str(threads)
-    return _adapters(folder).load(name, **({} if checkout is None else {"checkout": checkout}))
+    return adapters(folder).load(name, **({} if checkout is None else {"checkout": checkout}))

@@ -1,8 +1,10 @@
-"""A picture of a trajectory: from above, its height, and how far it is off the truth."""
+"""A picture of trajectories: from above, their height, and how far they are off the truth."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
+from itertools import cycle
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +23,8 @@ if TYPE_CHECKING:
 
 _WIDTH, _ABOVE, _BELOW = 8.0, 6.0, 1.8  # inches: of all, and the heights of the view from above and of each curve
 _DPI = 160
+# Of Okabe and Ito, as the first and the truth's: told apart by every kind of colour vision.
+_COLORS = SOURCE_COLOR, (0.0, 0.62, 0.451), (0.8, 0.475, 0.655), (0.9, 0.624, 0.0)
 
 
 def trajectory_picture(
@@ -35,22 +39,38 @@ def trajectory_picture(
     Raises MissingExtraError without matplotlib, and ArgumentError for a path that cannot be, for a trajectory without
     poses and for a truth of another length.
     """
+    return trajectories_picture({"trajectory": trajectory}, path, truth, title)
+
+
+def trajectories_picture(
+    trajectories: Mapping[str, Trajectory],
+    path: str | os.PathLike[str],
+    truth: Trajectory | None = None,
+    title: str | None = None,
+) -> Path:
+    """Draw several trajectories in one picture, which calls them by their names; the rest as of trajectory_picture."""
     path = checked_path(path)
+    for trajectory in trajectories.values():
+        _check(trajectory, truth)
+    figure, panels = _panels(1 if truth is None else 3)
+    _draw_ways(panels[0], panels[1], trajectories, truth)
+    if truth is not None:
+        _draw_errors(panels[2], panels[3], trajectories, truth)
+    panels[-1].set_xlabel("path (m)", color="0.3")
+    first = next(iter(trajectories.values()))
+    title = title or f"{len(first)} poses over {first.distances[-1]:.4g} m"
+    panels[0].set_title(title, fontsize=11, color="0.3", pad=10)
+    with replacing(path) as unfinished:
+        figure.savefig(unfinished, format=path.suffix[1:].lower())
+    return path
+
+
+def _check(trajectory: Trajectory, truth: Trajectory | None) -> None:
     if not len(trajectory):
         raise ArgumentError("trajectory must have poses to draw, but has none")
     if truth is not None and len(truth) != len(trajectory):
         raise ArgumentError(f"truth must have the {len(trajectory)} poses of the trajectory, row for row, but has "
                             f"{len(truth)}")
-    figure, panels = _panels(1 if truth is None else 3)
-    _draw_ways(panels[0], panels[1], trajectory, truth)
-    if truth is not None:
-        _draw_errors(panels[2], panels[3], trajectory, truth)
-    panels[-1].set_xlabel("path (m)", color="0.3")
-    panels[0].set_title(title or f"{len(trajectory)} poses over {trajectory.distances[-1]:.4g} m", fontsize=11,
-                        color="0.3", pad=10)
-    with replacing(path) as unfinished:
-        figure.savefig(unfinished, format=path.suffix[1:].lower())
-    return path
 
 
 def _panels(curves: int) -> tuple[Figure, list[Axes]]:
@@ -69,17 +89,19 @@ def _panels(curves: int) -> tuple[Figure, list[Axes]]:
     return figure, panels
 
 
-def _draw_ways(above: Axes, height: Axes, trajectory: Trajectory, truth: Trajectory | None) -> None:
+def _draw_ways(above: Axes, height: Axes, trajectories: Mapping[str, Trajectory], truth: Trajectory | None) -> None:
     """The truth lies below, wider and paler: where both are one, both are seen."""
-    along = (trajectory if truth is None else truth).distances
     if truth is not None:
         wide: dict[str, Any] = {"color": TARGET_COLOR, "linewidth": 4, "alpha": 0.45, "label": "truth"}
         above.plot(*truth.positions.T[:2], **wide)
-        height.plot(along, truth.positions[:, 2], **wide)
-    thin: dict[str, Any] = {"color": SOURCE_COLOR, "linewidth": 1.2, "label": "trajectory"}
-    above.plot(*trajectory.positions.T[:2], **thin)
-    height.plot(along, trajectory.positions[:, 2], **thin)
-    above.plot(*trajectory.positions[0, :2], "o", color="0.3", markersize=6, label="start")
+        height.plot(truth.distances, truth.positions[:, 2], **wide)
+    for (name, trajectory), color in zip(trajectories.items(), cycle(_COLORS)):
+        thin: dict[str, Any] = {"color": color, "linewidth": 1.2, "label": name}
+        along = (trajectory if truth is None else truth).distances
+        above.plot(*trajectory.positions.T[:2], **thin)
+        height.plot(along, trajectory.positions[:, 2], **thin)
+    start = next(iter(trajectories.values())).positions[0, :2]
+    above.plot(*start, "o", color="0.3", markersize=6, label="start")
     above.set_aspect("equal", adjustable="datalim")
     above.set_xlabel("x (m)", color="0.3")
     above.set_ylabel("y (m)", color="0.3")
@@ -87,9 +109,11 @@ def _draw_ways(above: Axes, height: Axes, trajectory: Trajectory, truth: Traject
     height.set_ylabel("z (m)", color="0.3")
 
 
-def _draw_errors(move: Axes, turn: Axes, trajectory: Trajectory, truth: Trajectory) -> None:
-    errors = PoseErrors.between(trajectory.poses, truth.poses)
-    for axes, values, name in ((move, errors.translation, "error (m)"), (turn, errors.rotation, "error (deg)")):
-        axes.plot(truth.distances, values, color=SOURCE_COLOR, linewidth=1.2)
-        axes.set_ylim(0, max(1.1 * float(np.max(values)), 1e-12))
-        axes.set_ylabel(name, color="0.3")
+def _draw_errors(move: Axes, turn: Axes, trajectories: Mapping[str, Trajectory], truth: Trajectory) -> None:
+    errors = {name: PoseErrors.between(trajectory.poses, truth.poses) for name, trajectory in trajectories.items()}
+    for axes, kind, label in ((move, "translation", "error (m)"), (turn, "rotation", "error (deg)")):
+        curves = {name: getattr(found, kind) for name, found in errors.items()}
+        for values, color in zip(curves.values(), cycle(_COLORS)):
+            axes.plot(truth.distances, values, color=color, linewidth=1.2)
+        axes.set_ylim(0, max(1.1 * float(np.max(list(curves.values()))), 1e-12))
+        axes.set_ylabel(label, color="0.3")
