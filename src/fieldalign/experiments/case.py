@@ -22,6 +22,7 @@ class Case:
     clouds: gives source and target, (N, 3) and (M, 3), the same ones each time; pickles, since it is called where the
         work is.
     T_target_source: (4, 4), the answer. T_guess: (4, 4), what is known beforehand.
+    seed: joins the experiment's, so that cases of one pair do not share their pseudo points.
     shape: gives points (K, 3) of the shape itself in the source's frame, where it may be like itself when it is turned:
         errors are then given modulo that, too. None: it is not. Pickles.
     """
@@ -32,6 +33,7 @@ class Case:
     T_target_source: Matrix
     T_guess: Matrix = field(default_factory=lambda: np.eye(4))
     shape: Callable[[], Floats] | None = None
+    seed: int = 0
 
 
 @dataclass(frozen=True, eq=False)

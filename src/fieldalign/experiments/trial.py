@@ -33,7 +33,8 @@ class Trial:
         case, column = data
         source, target = self._clouds(case)
         _warm_up(column.align, self.threads, source)
-        answer, cost = self.measured(lambda: column.align(source, target, case.T_guess, self.threads, self.seed))
+        seed = self.seed + case.seed
+        answer, cost = self.measured(lambda: column.align(source, target, case.T_guess, self.threads, seed))
         T, T_true = answer.T_target_source, case.T_target_source
         row = {
             "T": T[:3].ravel().tolist(), "accepted": answer.accepted, "rre_deg": rotation_error(T, T_true),
