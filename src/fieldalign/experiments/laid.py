@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..clouds.thinning import thin
+from ..errors import DataSetError
 from ..fields.protocol import Floats
 from ..motions import Matrix, apply, exp_twist, inverse
 from .case import Case
@@ -64,8 +65,8 @@ class Laid:
 
 
 def as_case(laid: Laid, draw: int) -> Case:
-    """The case of a pair that is laid so. draw: of how many with this pair; it is part of the name."""
-    return Case(f"{laid.pair.name}/{draw}", laid.pair.group, laid, laid.T_target_source)
+    """The case of a pair that is laid so. draw: of how many with this pair; it is part of the name and of the seed."""
+    return Case(f"{laid.pair.name}/{draw}", laid.pair.group, laid, laid.T_target_source, seed=draw)
 
 
 @dataclass(frozen=True)
@@ -83,8 +84,10 @@ class LaidCases:
     least: int = 1
 
     def __call__(self, data: Path, seed: int) -> list[Case]:
-        """All cases; each draw of all pairs comes after the draw before."""
+        """All cases; each draw of all pairs comes after the draw before. Raises DataSetError where there is none."""
         once = self.pairs(data)
+        if not once:
+            raise DataSetError(f"{data} holds clouds, but no pair of them that is as far apart as asked for")
         pairs = [*once] * -(-self.least // len(once))
         motions = self.motions(np.random.default_rng(seed), pairs)
         return [
