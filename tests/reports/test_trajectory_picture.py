@@ -9,7 +9,7 @@ import fieldalign as fa
 from fieldalign.motions import translation
 from fieldalign.odometry.trajectory import Trajectory
 from fieldalign.reports import trajectory_picture as module
-from fieldalign.reports.trajectory_picture import trajectory_picture
+from fieldalign.reports.trajectory_picture import trajectories_picture, trajectory_picture
 
 
 @pytest.fixture
@@ -47,6 +47,19 @@ def test_the_ways_and_the_errors_are_drawn(drives, panels, tmp_path):
     np.testing.assert_allclose(angle.get_ydata(), 0, atol=1e-6)
     assert above.get_title() == "a drive"
     assert panels[-1].get_xlabel() == "path (m)"
+
+
+def test_several_trajectories_are_told_apart(drives, panels, tmp_path):
+    pytest.importorskip("matplotlib")
+    trajectory, truth = drives
+    ways = {"a": trajectory, "b": truth.in_world(translation([1.0, 0, 0]))}
+    trajectories_picture(ways, tmp_path / "drives.png", truth)
+    above, height, move, _ = panels
+    for name, way in ways.items():
+        assert np.array_equal(curves(above)[name], way.positions[:, :2])
+        assert np.array_equal(curves(height)[name], np.c_[truth.distances, way.positions[:, 2]])
+    assert len({line.get_color() for line in above.get_lines()}) == 4  # of both ways, of the truth and of the start
+    assert [line.get_ydata()[0] for line in move.get_lines()] == pytest.approx([3, 1])
 
 
 @pytest.mark.parametrize("suffix", [".svg", ".pdf"])

@@ -42,7 +42,8 @@ def command(
     """Run an experiment of the paper on its data set, as people have it on disk.
 
     Writes NAME.json (protocol, versions, seeds, every pair), NAME.md (the table, published figures beside) and NAME.png
-    into the folder, which is made where it is not there. Called again after an interruption it goes on from there.
+    into the folder, which is made where it is not there; of several tables in one NAME.md, each has a .json of its own.
+    Called again after an interruption it goes on from there.
     """
     folder = _folder(output)
     if pointnetlk is not None and peers is None:

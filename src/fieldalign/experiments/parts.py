@@ -29,7 +29,7 @@ class Parts:
 
         Raises DataSetError where there are data of none, ArgumentError for columns that are in none.
         """
-        asked_of([name for part in self.parts for name in part.columns(request)], request)
+        asked_of({name: part for part in self.parts for name in part.columns(request)}, request)
         pages, texts, files = [f"# {self.title}", ""], [], []
         left_out: list[DataSetError] = []
         for part, asked in self._asked(request):
