@@ -32,7 +32,6 @@ METHODS = {
     "icp-plane": ("open3d_plain_icp", "Open3D ICP, point to plane, from the guess", {"planes": True}),
     "cpd": ("pycpd_cpd", "pycpd CPD, from the guess", {}),
     "filterreg": ("probreg_methods", "probreg FilterReg, from the guess", {}),
-    "gmmtree": ("probreg_methods", "probreg GMMTree, from the guess", {"method": "gmmtree"}),
     "svr": ("probreg_methods", "probreg SVR, from the guess", {"method": "svr"}),
     "pointnetlk-revisited": ("pointnetlk_revisited", "PointNetLK-Revisited, from the guess", {"checkout": None}),
 }

@@ -22,8 +22,7 @@ PRIOR = Column("default", "fieldalign, from the guess, within 50 deg", ByDefault
 ANY_POSE = Column("default-any-pose", "fieldalign, without a guess", ByDefault())
 
 PEERS = (
-    "icp-point", "icp-plane", "icp", "gicp-plain", "gicp", "kiss", "ransac", "fgr", "filterreg", "gmmtree", "svr",
-    "cpd",
+    "icp-point", "icp-plane", "icp", "gicp-plain", "gicp", "kiss", "ransac", "fgr", "filterreg", "svr", "cpd",
 )
 SOME_PEERS = "icp-point", "icp-plane", "gicp", "kiss", "filterreg", "cpd"  # where there are many cases
 VOXEL = 0.02  # of shapes whose longest edge is 1: what suits them
