@@ -5,7 +5,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 SOURCES := $(shell find src cpp -name '*.py' -o -name '*.hpp' -o -name '*.cpp' -o -name '*.pyi') CMakeLists.txt pyproject.toml
 
-.PHONY: demo test lint bench-paper bench-any-pose bench-verdict bench-fields bench-assemble bench-odometry wheels clean
+.PHONY: demo test lint bench-paper bench-any-pose bench-verdict bench-fields bench-assemble bench-odometry experiments wheels clean
 
 demo: $(VENV)/.installed-viz      ## simulate two scans of a room, register them, compare with the truth
 	$(BIN)/fieldalign demo --output demo
@@ -38,6 +38,14 @@ bench-assemble:                   ## many scans: real sets and a heap of them be
 bench-odometry:                   ## real frames, simulated drives, endurance and faults, beside KISS-ICP; two hours
 	$(MAKE) VENV=$(VENV)-bench $(VENV)-bench/.installed-bench
 	$(VENV)-bench/bin/python benchmarks/odometry.py --loops --output docs/benchmarks
+
+EXPERIMENTS := modelnet40 shapenet success-rate efficiency density noise 3dmatch kitti kitti-trajectory ablation \
+	distance-field pseudo-sets data-examples
+
+experiments:                      ## the paper's experiments on ../shared/data, beside the peers; half an hour
+	$(MAKE) VENV=$(VENV)-bench $(VENV)-bench/.installed-bench
+	for name in $(EXPERIMENTS); do $(VENV)-bench/bin/fieldalign experiment $$name --peers benchmarks/peers \
+		--data $${FIELDALIGN_DATA:-../shared/data} --output docs/experiments || exit 1; done
 
 wheels: $(VENV)/bin/python        ## wheels for this platform, as CI builds them
 	$(BIN)/pip install --quiet cibuildwheel
