@@ -19,6 +19,7 @@ from .choice import Choice, Pairs
 from .fused import fused
 from .graph import Graph
 from .joint import Pull
+from .looks import Look
 from .pair_result import PairResult
 from .pose_graph import Edge, linearised, optimise
 from .scan import read_scan
@@ -29,8 +30,7 @@ from .world import Given, anchored
 
 _TILE = 16          # scans on a side of a tile of glances
 _OVERLAP = 0.3      # of either scan: pairs that overlap so much, by their poses, are registered, too
-_CHECKS = 20        # rounds in which edges are given up, at most
-_NEAR = 20          # scans around each one, of which that is asked
+_LOOKS = 40         # rounds in which scans are laid anew by what sensors saw, at most
 _NEIGHBOURS = 3     # of these, for each scan
 _ROUNDS = 3         # of the joint refinement, at most
 _STILL = 2e-3       # voxels: a step that moves no place further is its last
@@ -40,24 +40,20 @@ _MODEL = 0.25       # of a component's median voxel: the thinning of its model
 def build(shop: Workshop, given: Given, ordered: bool, dof: Dof | None, seed: int) -> Assembly:
     """The whole assembly."""
     clock = Clock()
-    lengths, broken = shop.thin()
+    lengths, places, broken = shop.thin()
     clock.lap("read")
     known = np.array([k in lengths for k in range(len(shop.clouds))])
-    graph = Graph(lengths, len(known), seed)
+    graph = Graph(lengths, places, len(known), seed)
     likeness = _near(given, lengths) if given.is_useful else _glances(shop, known, graph.unit, dof, seed)
     clock.lap("glance")
     choice = Choice(likeness, ordered, known)
     pairs = choice.first()
     while pairs:
         graph.add(_related(shop, pairs, given, dof, seed))
+        clock.lap("pairs")
+        _settled(shop, graph)
+        clock.lap("check")
         pairs = choice.more(graph.component)
-    clock.lap("pairs")
-    for _ in range(_CHECKS):
-        _look(shop, graph)
-        if not graph.check():
-            break
-        graph.add(_related(shop, choice.more(graph.component), given, dof, seed))
-    clock.lap("check")
     near = choice.add(_overlapping(graph))
     graph.add(_related(shop, near, graph.guesses(), dof, seed))
     clock.lap("overlaps")
@@ -126,27 +122,36 @@ def _related(
     return results
 
 
-def _look(shop: Workshop, graph: Graph) -> None:
-    """Looks at pairs that were not tried but lie near by their poses: how much overlaps, and was looked through."""
+def _settled(shop: Workshop, graph: Graph) -> None:
+    """Lays scans by what sensors saw, until nothing changes."""
+    for _ in range(_LOOKS):
+        asked = _look(shop, graph)
+        if not graph.settle() and not asked:
+            break
+
+
+def _look(shop: Workshop, graph: Graph) -> bool:
+    """Looks at pairs where they lie near each other: how much overlaps, and was looked through; whether at any."""
     tasks = []
-    for i, near in groupby(graph.unseen(_NEAR), key=lambda pair: pair[0]):
-        others = [j for _, j in near]
-        names = [name_of(j) for j in others]
-        poses = inverse(graph.poses[i]) @ graph.poses[others]
-        tasks.append((i, others, Task(f"overlaps {i}", (name_of(i), *names), (name_of(i), names, poses))))
+    for i, near in groupby(sorted(graph.unseen(), key=lambda laid: (laid.i, laid.j)), key=lambda laid: laid.i):
+        pairs = list(near)
+        names = [name_of(laid.j) for laid in pairs]
+        poses = np.stack([laid.T_ij for laid in pairs])
+        tasks.append((pairs, Task(f"overlaps {i}", (name_of(i), *sorted(set(names))), (name_of(i), names, poses))))
     if len(tasks) > 1:  # along the place, so that a worker finds at hand what it has just looked at
-        places = graph.poses[[i for i, _, _ in tasks], :3, 3]
+        places = graph.poses[[pairs[0].i for pairs, _ in tasks], :3, 3]
         length = np.linalg.svd(places - places.mean(axis=0), full_matrices=False)[2][0]
         tasks = [tasks[k] for k in np.argsort(places @ length, kind="stable")]
-    found = shop.do("comparing", Overlaps(graph.unit), [task for _, _, task in tasks])
-    for i, others, task in tasks:
-        for j, T_ij, shares in zip(others, task.data[2], found[task.key].value or [], strict=False):
-            graph.saw((i, j), T_ij, *shares)
+    found = shop.do("comparing", Overlaps(graph.unit), [task for _, task in tasks])
+    for pairs, task in tasks:
+        for laid, shares in zip(pairs, found[task.key].value or [], strict=False):
+            graph.saw(laid, Look(*shares))
+    return bool(tasks)
 
 
 def _overlapping(graph: Graph) -> Pairs:
     """Pairs that were not tried, but overlap well by their poses: each scan's best few."""
-    share = {(i, j): on for i, j, on, _ in graph.seen() if graph.component[i] == graph.component[j]}
+    share = graph.overlaps()
     chosen: Pairs = []
     asked: Counter[int] = Counter()
     for i, j in sorted(share, key=lambda pair: -share[pair]):

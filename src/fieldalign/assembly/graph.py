@@ -2,109 +2,101 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..fields.protocol import Floats
-from ..motions import inverse, log_motion, reach_of
-from .blame import blamed
-from .consensus import Consensus, consensus
+from .consensus import consensus
+from .looks import Laid, Look, Looks
 from .pair_result import PairResult
+from .parts import CLEAR, Parts, Told, says
 from .pose_graph import Edge
 from .world import Given
 
-_CLEAR = 0.003  # share of a surface that a sensor looked through: less in a static scene, more where places look alike
 _AGREE = 1.5    # more than so many uncertain pairs that agree join what they lie between, unclear ones count less
-_AS_BEFORE = 0.1  # voxels: a scan that moves no further lies where it was seen
-_OBJECTION, _CHANCE = 20.0, 0.5  # to a pair that was accepted: one that was looked through, and one that was not
+_NEAR = 20      # scans around each one, of its component, that are looked at
 _CLOSE, _CLOSER = 1.7, 2.0  # by so much the margin may fall short, the latter where no known sensor objects
+
+Pair = tuple[int, int]
 
 
 class Graph:
-    """All that was found of pairs, and what follows from it."""
+    """All that was found of pairs, and what follows from it.
 
-    def __init__(self, lengths: dict[int, tuple[float, float]], count: int, seed: int) -> None:
+    Where sensors are known, they decide (parts.py); else what agrees around cycles (consensus.py).
+    """
+
+    def __init__(
+        self, lengths: dict[int, tuple[float, float]], places: Mapping[int, Floats], count: int, seed: int
+    ) -> None:
+        """lengths: voxel and extent of each scan that can be had; places: (3,), where it was taken from."""
         self._lengths, self._count, self._seed = lengths, count, seed
         self.unit = float(np.median([voxel for voxel, _ in lengths.values()])) if lengths else 1.0
-        self.results: dict[tuple[int, int], PairResult] = {}
-        self._given_up: set[tuple[int, int]] = set()
-        self._seen: dict[tuple[int, int], tuple[Floats, float, float | None]] = {}
-        self._consensus: Consensus | None = None
+        reach = np.array([lengths[k][1] / 2 if k in lengths else 0.0 for k in range(count)])
+        self.results: dict[Pair, PairResult] = {}
+        taken_from = np.stack([places.get(k, np.zeros(3)) for k in range(count)])
+        self._looks = Looks(taken_from, reach, self.unit)
+        self._parts = Parts(self._looks)
+        self._is_seen = False  # whether any sensor is known
+        self.edges: list[Edge] = []
+        self._believed: NDArray[np.bool_] = np.zeros(0, bool)
+        self.poses = np.tile(np.eye(4), (count, 1, 1))
         self.component: NDArray[np.int64] = np.arange(count)
         self.components: list[list[int]] = []
 
-    def add(self, results: dict[tuple[int, int], PairResult]) -> None:
+    def add(self, results: dict[Pair, PairResult]) -> None:
         """Takes the results of pairs (i, j), and decides anew whom to believe."""
         self.results |= results
-        self.pairs = [pair for pair, r in self.results.items() if usable(r) and pair not in self._given_up]
-        if not self.pairs:
-            return
-        self.edges = [_edge_of(*pair, self.results[pair]) for pair in self.pairs]
-        sizes = [(self._lengths[i], self._lengths[j]) for i, j in self.pairs]
-        voxels = np.array([max(a[0], b[0]) for a, b in sizes])
-        extents = np.array([min(a[1], b[1]) for a, b in sizes])
-        self._consensus = consensus(self._count, self.edges, voxels, extents, self._seed)
-        self.component = self._joined()
+        self.edges = [_edge_of(*pair, r) for pair, r in self.results.items() if usable(r)]
+        self._is_seen |= any(r.evidence is not None and r.evidence.seen_through is not None for r in results.values())
+        self._parts.add({pair: _told_of(r) for pair, r in results.items() if usable(r)})
+        self._decide()
+
+    def _decide(self) -> None:
+        if self._is_seen:
+            self.poses = self._parts.poses.copy()
+            self._believed = np.array([self._parts.agrees((e.i, e.j)) for e in self.edges], bool)
+            self.component = self._tied()
+        elif self.edges:
+            sizes = [(self._lengths[e.i], self._lengths[e.j]) for e in self.edges]
+            voxels = np.array([max(a[0], b[0]) for a, b in sizes])
+            extents = np.array([min(a[1], b[1]) for a, b in sizes])
+            found = consensus(self._count, self.edges, voxels, extents, self._seed)
+            self.poses, self._believed = found.poses, found.believed
+            self.component = self._joined()
         numbers, sizes_of = np.unique(self.component, return_counts=True)
         self.components = sorted(
             (np.flatnonzero(self.component == c).tolist() for c in numbers[sizes_of > 1]),
             key=lambda members: (-len(members), members),
         )
 
-    def unseen(self, count: int) -> list[tuple[int, int]]:
-        """Pairs (i, j) that the tree lays near enough to overlap, of either's nearest few, but of which nobody knows
-        yet what they show of each other where they lie."""
-        roots = np.zeros(0, int) if self._consensus is None else self._consensus.roots()
-        near: list[tuple[int, int]] = []
-        for root in np.flatnonzero(np.bincount(roots, minlength=1) > 1):
-            members = np.flatnonzero(roots == root)
-            places = self.poses[members, :3, 3]
-            reach = np.array([self._lengths[int(k)][1] / 2 for k in members])
-            away = np.linalg.norm(places[:, None] - places, axis=2)
-            rank = np.argsort(np.argsort(away, axis=1, kind="stable"), axis=1)  # 0: the scan itself
-            may = (np.minimum(rank, rank.T) <= count) & (away < np.minimum(reach, reach[:, None]))
-            near += [(int(members[a]), int(members[b])) for a, b in np.argwhere(np.triu(may, 1))]
-        return [pair for pair in near if pair not in self.results and not self._is_as_seen(pair)]
+    def unseen(self) -> list[Laid]:
+        """Pairs that lie near enough to overlap, but of which nobody knows yet what they show of each other there."""
+        if self._is_seen:
+            return self._parts.unseen()
+        return [at for at in self._near() if (at.i, at.j) not in self.results and self._looks.find(at) is None]
 
-    def saw(self, pair: tuple[int, int], T_ij: Floats, on: float, through: float | None) -> None:
-        """Takes what a pair shows of each other at T_ij (4, 4): the share of surface that lies on the other's, and the
-        share that was looked through, None where no sensor is known."""
-        self._seen[pair] = T_ij, on, through
+    def saw(self, laid: Laid, look: Look) -> None:
+        """Takes what a pair shows where it is laid."""
+        self._looks.add(laid, look)
 
-    def seen(self) -> Iterator[tuple[int, int, float, float | None]]:
-        """Pairs i, j that lie where they were seen, and these shares."""
-        for pair, (_, on, through) in self._seen.items():
-            if self._is_as_seen(pair):
-                yield *pair, on, through
+    def settle(self) -> bool:
+        """Lays scans anew by what was seen; whether anything has changed."""
+        changed = self._is_seen and self._parts.settle()
+        self._decide()
+        return changed
 
-    def _is_as_seen(self, pair: tuple[int, int]) -> bool:
-        if pair not in self._seen or self._consensus is None:
-            return False
-        i, j = pair
-        off = log_motion(inverse(self._seen[pair][0]) @ inverse(self.poses[i]) @ self.poses[j])
-        return reach_of(off, self._lengths[j][1]) <= _AS_BEFORE * self.unit
+    def overlaps(self) -> dict[Pair, float]:
+        """What share of their surface pairs show of each other where they lie, of those that were looked at."""
+        return {(at.i, at.j): look.on for at in self._near() if (look := self._looks.find(at)) is not None}
 
-    def check(self) -> bool:
-        """Gives up edges that lay scans where sensors looked through them, and joins what lies well; whether anything
-        has changed."""
-        if self._consensus is None:
-            return False
-        before = self.component
-        believed = zip(self.edges, self._consensus.believed, strict=True)
-        votes = [(e.i, e.j, -clarity(self.results[e.i, e.j])) for e, ok in believed if ok]
-        votes += [(i, j, -_says(on, through)) for i, j, on, through in self.seen()]
-        guilty = blamed(self._consensus, votes, np.sqrt([edge.strength for edge in self.edges]))
-        self._given_up |= {self.pairs[k] for k in guilty}
-        self.add({})
-        return bool(guilty) or not np.array_equal(before, self.component)
-
-    @property
-    def poses(self) -> Floats:
-        """The poses (n, 4, 4) along the tree that is believed."""
-        return np.tile(np.eye(4), (self._count, 1, 1)) if self._consensus is None else self._consensus.poses
+    def _near(self) -> Iterator[Laid]:
+        label = self._parts.label if self._is_seen else self.component
+        for number in np.flatnonzero(np.bincount(label) > 1):
+            yield from self._looks.near(self.poses, np.flatnonzero(label == number), _NEAR)
 
     def believed(self, members: Sequence[int]) -> list[Edge]:
         """The edges between some scans that the others do not contradict."""
@@ -124,25 +116,29 @@ class Graph:
         return {k: self._reason_of(k) for k in scans}
 
     def _judged(self) -> Iterable[tuple[Edge, bool]]:
-        if self._consensus is None:
-            return []
-        same = [self.component[e.i] == self.component[e.j] for e in self.edges]
-        return zip(self.edges, self._consensus.believed & np.array(same), strict=True)
+        same = np.array([self.component[e.i] == self.component[e.j] for e in self.edges], bool)
+        return zip(self.edges, self._believed & same, strict=True)
+
+    def _tied(self) -> NDArray[np.int64]:
+        """The component (n,) of each scan: the believed edges tie them."""
+        label = np.arange(self._count)
+        for edge, ok in zip(self.edges, self._believed, strict=True):
+            if ok:
+                label[label == label[edge.j]] = label[edge.i]
+        return label
 
     def _joined(self) -> NDArray[np.int64]:
         """The component (n,) of each scan. One edge joins two scans if it is certain; others, as along a street that
-        holds a pose in part only, join where two agree, or where what they lay on each other agrees."""
-        assert self._consensus is not None
-        label = np.arange(self._count)
-        links = [(i, j, _says(on, through)) for i, j, on, through in self.seen()]
-        for edge, ok in zip(self.edges, self._consensus.believed, strict=True):
+        holds a pose in part only, join where two agree."""
+        label, links = np.arange(self._count), []
+        for edge, ok in zip(self.edges, self._believed, strict=True):
             result = self.results[edge.i, edge.j]
             if ok and is_certain(result):
                 label[label == label[edge.j]] = label[edge.i]
             elif ok:
                 links.append((edge.i, edge.j, weight_of(result)))
         while True:
-            between: dict[tuple[int, int], float] = {}
+            between: dict[Pair, float] = {}
             for i, j, agrees in links:
                 a, b = sorted((int(label[i]), int(label[j])))
                 between[a, b] = between.get((a, b), 0) + agrees * (a != b)
@@ -164,25 +160,13 @@ class Graph:
 def is_certain(result: PairResult) -> bool:
     """Whether a pair alone joins two scans: it is accepted, and no sensor that is known looked through the other's
     surface, not even through as much as furniture that was moved."""
-    return result.accepted and (result.evidence is None or (result.evidence.seen_through or 0.0) <= _CLEAR)
-
-
-def _says(on: float, through: float | None) -> float:
-    """What speaks for the pose of a pair that was not registered, an accepted pair being 1; less than 0: against it."""
-    if through is None:
-        return 0.0
-    clear = clarity_of(through)
-    return on * (_CHANCE * clear - _OBJECTION * (1 - clear))
+    return result.accepted and (result.evidence is None or (result.evidence.seen_through or 0.0) <= CLEAR)
 
 
 def clarity(result: PairResult) -> float:
     """1 where no sensor that is known looked through the other's surface, less where one did."""
-    return clarity_of(0.0 if result.evidence is None else result.evidence.seen_through or 0.0)
-
-
-def clarity_of(seen_through: float) -> float:
-    """The same of the share of a surface that was looked through."""
-    return 1 / (1 + (seen_through / _CLEAR) ** 2)
+    seen_through = 0.0 if result.evidence is None else result.evidence.seen_through or 0.0
+    return 1 / (1 + (seen_through / CLEAR) ** 2)
 
 
 def usable(result: PairResult) -> bool:
@@ -204,7 +188,7 @@ def weight_of(result: PairResult) -> float:
         return clarity(result)
     if evidence is None:
         return 0.0
-    is_clear = evidence.seen_through is not None and evidence.seen_through <= _CLEAR
+    is_clear = evidence.seen_through is not None and evidence.seen_through <= CLEAR
     lenient = replace(evidence, hold=1.0, margin=(_CLOSER if is_clear else _CLOSE) * evidence.margin)
     return clarity(result) * (1.0 if is_clear else 0.5) * lenient.reason.accepts
 
@@ -212,3 +196,10 @@ def weight_of(result: PairResult) -> float:
 def _edge_of(i: int, j: int, result: PairResult) -> Edge:
     strength = (result.evidence.strength if result.evidence else 1.0) * weight_of(result)
     return Edge(i, j, result.T_target_source, result.information, result.reference_point, max(strength, 1e-6))
+
+
+def _told_of(result: PairResult) -> Told:
+    through = None if result.evidence is None else result.evidence.seen_through
+    strength = result.evidence.strength if result.evidence else 1.0
+    look = Look(max(result.overlap, result.overlap_target), through)
+    return Told(result.T_target_source, says(look), strength * weight_of(result), is_certain(result))

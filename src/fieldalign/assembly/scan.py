@@ -32,6 +32,11 @@ class ThinScan:
         """Ready for registration; made where it is asked for, and not sent along."""
         return PreparedCloud(PointField(self.points, threads=1), self.dropped, 1, self.eye)
 
+    @property
+    def place(self) -> Floats:
+        """Where it was taken from (3,), in its own frame, or its middle where that is not known."""
+        return np.median(self.points, axis=0) if self.eye is None else self.eye
+
     def __getstate__(self) -> dict[str, Any]:
         return {name: value for name, value in self.__dict__.items() if name != "cloud"}
 

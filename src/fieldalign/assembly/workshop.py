@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TypeAlias
 
+from ..fields.protocol import Floats
 from ..prepare import CloudLike
 from .executor import Executor
 from .identity import identity_of
@@ -56,8 +57,9 @@ class Workshop:
     def __exit__(self, *error: object) -> None:
         self._opened.__exit__(*error)  # type: ignore[arg-type]
 
-    def thin(self) -> tuple[dict[int, tuple[float, float]], dict[int, str]]:
-        """Thins each scan into a file. Voxel and extent of each that can be read, and of the others why not."""
+    def thin(self) -> tuple[dict[int, tuple[float, float]], dict[int, Floats], dict[int, str]]:
+        """Thins each scan into a file. Voxel and extent, and where it was taken from (3,), of each that can be read,
+        and of the others why not."""
         missing = [k for k in range(len(self.clouds)) if not self.path(k).exists()]
         items = {}
         for k in missing:
@@ -69,12 +71,12 @@ class Workshop:
                 write_scan(self.path(int(done.key)), done.value)
             else:
                 broken[int(done.key)] = done.error
-        lengths = {}
+        lengths, places = {}, {}
         for k in range(len(self.clouds)):
             if k not in broken:
                 scan = read_scan(self.path(k))
-                lengths[k] = scan.voxel, scan.extent
-        return lengths, dict(sorted(broken.items()))
+                lengths[k], places[k] = (scan.voxel, scan.extent), scan.place
+        return lengths, places, dict(sorted(broken.items()))
 
     def do(
         self, stage: str, function: Function, tasks: Iterable[Task], plain: Callable[[Any], Any] | None = None,

@@ -9,12 +9,12 @@ import numpy as np
 from ..dof import Allowed, Dof, allowed_poses
 from ..fields.protocol import Floats, Planes
 from ..lazy import lazy
-from ..motions import angles_between, apply, growth, inverse, size_of, translation
+from ..motions import angles_between, apply, growth, inverse, rotate, size_of, translation
 from ..prepared import PreparedCloud
 from ..surface import Surface
 
 _SLACK = np.radians(2)  # beyond an angle around the guess, at which a pose may end
-_LOOKED_AT = 3000  # surfels, about, of which it is asked whether a sensor looked through them
+_LOOKED_AT = 10_000  # surfels, about, of which it is asked whether a sensor looked through them
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,9 +103,10 @@ class Pair:
         for seen, by, motion in ((self.source, self.target, T), (self.target, self.source, inverse(T))):
             if by.sight is not None:
                 surface = seen.surface(self.voxel)
-                some = surface.places[:: max(1, len(surface) // _LOOKED_AT)]
-                places = apply(motion, some + surface.origin)
-                shares.append(float(by.sight.looked_through(places, self.voxel).mean()))
+                some = slice(None, None, max(1, len(surface) // _LOOKED_AT))
+                places = apply(motion, surface.places[some] + surface.origin)
+                normals = rotate(motion[:3, :3], surface.normals[some])
+                shares.append(float(by.sight.looked_through(places, self.voxel, normals).mean()))
         return max(shares, default=None)
 
     def is_within(self, angle: float, T: Floats) -> bool:
