@@ -33,7 +33,7 @@ def result_of(evidence=GOOD, T=None):
         (replace(GOOD, margin=1.5), True, False),           # which needs others that agree
         (replace(GOOD, margin=1.4), False, False),
         (replace(CLEAR, margin=1.5), True, False),          # no sensor objects
-        (replace(CLEAR, margin=1.1), False, False),
+        (replace(CLEAR, margin=1.1), True, False),
         (replace(CLEAR, margin=1.5, seen_through=0.01), True, False),  # and counts next to nothing
         (replace(CLEAR, margin=1.5, agreeing=0.1), False, False),
     ],

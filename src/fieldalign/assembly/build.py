@@ -132,21 +132,30 @@ def _settled(shop: Workshop, graph: Graph) -> None:
 
 def _look(shop: Workshop, graph: Graph) -> bool:
     """Looks at pairs where they lie near each other: how much overlaps, and was looked through; whether at any."""
+    asked = graph.unseen()
+    rank = _neighbours_first(len(shop.clouds), [(laid.i, laid.j) for laid in asked])
     tasks = []
-    for i, near in groupby(sorted(graph.unseen(), key=lambda laid: (laid.i, laid.j)), key=lambda laid: laid.i):
+    for i, near in groupby(sorted(asked, key=lambda laid: (rank[laid.i], laid.i, laid.j)), key=lambda laid: laid.i):
         pairs = list(near)
         names = [name_of(laid.j) for laid in pairs]
         poses = np.stack([laid.T_ij for laid in pairs])
         tasks.append((pairs, Task(f"overlaps {i}", (name_of(i), *sorted(set(names))), (name_of(i), names, poses))))
-    if len(tasks) > 1:  # along the place, so that a worker finds at hand what it has just looked at
-        places = graph.poses[[pairs[0].i for pairs, _ in tasks], :3, 3]
-        length = np.linalg.svd(places - places.mean(axis=0), full_matrices=False)[2][0]
-        tasks = [tasks[k] for k in np.argsort(places @ length, kind="stable")]
     found = shop.do("comparing", Overlaps(graph.unit), [task for _, task in tasks])
     for pairs, task in tasks:
         for laid, shares in zip(pairs, found[task.key].value or [], strict=False):
             graph.saw(laid, Look(*shares))
     return bool(tasks)
+
+
+def _neighbours_first(count: int, pairs: Pairs) -> NDArray[np.int64]:
+    """The rank (n,) of each scan in an order in which scans that make pairs are near each other (Cuthill & McKee 1969),
+    so that a worker finds at hand what it has just looked at."""
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+    i, j = np.array(pairs, int).reshape(-1, 2).T
+    ties = csr_array((np.ones(2 * len(i)), (np.r_[i, j], np.r_[j, i])), shape=(count, count))
+    return np.argsort(reverse_cuthill_mckee(ties, symmetric_mode=True))
 
 
 def _overlapping(graph: Graph) -> Pairs:

@@ -14,6 +14,9 @@ _THEN = 2         # more of them in each round, for scans whose component is not
 _MOST = 12        # pairs that a scan asks for, of those that glances propose
 _FEW = 12         # scans of which all pairs are tried
 _HOPE = 0.005     # the score of a glance that is worth a try
+_ALONE = 3        # scans of a component, at most, that are also tried where glances see no hope,
+_AT_LAST = 20     # so many pairs of each scan in a round,
+_EACH = 10        # until so many pairs were tried for each scan there is
 
 Pairs = list[tuple[int, int]]
 
@@ -40,20 +43,35 @@ class Choice:
         return pairs + self._likeliest(scans, np.ones_like(self._likeness, bool), _AT_FIRST)
 
     def more(self, component: NDArray[np.int64]) -> Pairs:
-        """The next likeliest partners in other components (n,), for the scans outside the largest one; none where all
-        are joined or none is left to ask."""
-        numbers, sizes = np.unique(component[self._known], return_counts=True)
+        """The next likeliest partners in other components (n,), for the scans outside the largest one; then, for those
+        that are (nearly) alone, also unlikely ones. None where all are joined or none is left to ask."""
+        numbers, of, sizes = np.unique(component[self._known], return_inverse=True, return_counts=True)
         if len(numbers) < 2:
             return []
         outside = component != numbers[sizes.argmax()]
         scans = np.flatnonzero(self._known & outside & (self._asked < _MOST))
-        return self._likeliest(scans, component[:, None] != component[None], _THEN)
+        may = component[:, None] != component[None]
+        pairs = self._likeliest(scans, may, _THEN)
+        if not pairs:
+            known = np.flatnonzero(self._known)
+            alone = known[(sizes[of] <= _ALONE) & outside[known]]
+            left = _EACH * len(known) - len(self.tried)
+            may = may & self._known
+            pairs = [
+                pair for i in alone
+                for pair in self._new(((int(i), j) for j in self._partners(i, may)), _AT_LAST)
+            ] if left >= _AT_LAST * len(alone) else []
+        return pairs
+
+    def _partners(self, i: int, may: NDArray[np.bool_]) -> list[int]:
+        """The scans that one may be joined with, the likeliest first."""
+        order = np.argsort(-self._likeness[i], kind="stable")
+        return [int(j) for j in order if may[i, j] and i != j]
 
     def _likeliest(self, scans: NDArray[np.int64], may: NDArray[np.bool_], count: int) -> Pairs:
         pairs: Pairs = []
         for i in scans:
-            order = np.argsort(-self._likeness[i], kind="stable")
-            partners = [int(j) for j in order if may[i, j] and self._likeness[i, j] > _HOPE and i != j]
+            partners = [j for j in self._partners(i, may) if self._likeness[i, j] > _HOPE]
             fresh = self._new(((int(i), j) for j in partners), min(count, _MOST - int(self._asked[i])))
             self._asked[i] += len(fresh)
             pairs += fresh

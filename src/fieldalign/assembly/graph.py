@@ -18,7 +18,7 @@ from .world import Given
 
 _AGREE = 1.5    # more than so many uncertain pairs that agree join what they lie between, unclear ones count less
 _NEAR = 20      # scans around each one, of its component, that are looked at
-_CLOSE, _CLOSER = 1.7, 2.0  # by so much the margin may fall short, the latter where no known sensor objects
+_CLOSE = 1.7    # by so much the margin may fall short; by anything where no known sensor objects
 
 Pair = tuple[int, int]
 
@@ -189,7 +189,7 @@ def weight_of(result: PairResult) -> float:
     if evidence is None:
         return 0.0
     is_clear = evidence.seen_through is not None and evidence.seen_through <= CLEAR
-    lenient = replace(evidence, hold=1.0, margin=(_CLOSER if is_clear else _CLOSE) * evidence.margin)
+    lenient = replace(evidence, hold=1.0, margin=np.inf if is_clear else _CLOSE * evidence.margin)
     return clarity(result) * (1.0 if is_clear else 0.5) * lenient.reason.accepts
 
 

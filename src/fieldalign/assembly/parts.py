@@ -233,8 +233,8 @@ class Parts:
                 changed = True
         for held, side, m in self._astray(links):
             if not m.unseen and held < _CLEARLY * m.says and m.says <= held + _BETTER:
-                rest = np.setdiff1d(self._members(m.a), side)
-                self._lay(side if len(side) <= len(rest) else rest, np.eye(4), self._free())
+                others = np.setdiff1d(self._members(m.a), side).tolist()
+                self._lay(min(side, others, key=len), np.eye(4), self._free())
                 return True
         return changed
 
