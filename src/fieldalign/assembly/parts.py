@@ -26,7 +26,7 @@ _FOR, _AGAINST = 0.5, 10.0  # what a pair that wholly overlaps says where it is 
 _SAME = 2.0        # voxels: a pair says that the scans lie so, if they lie no further off
 _SURE, _JOINS = 0.1, 1.0  # what must speak for joining parts, with a certain pair between them, and without
 _BETTER = 0.1      # by so much must the sum grow where scans move or are parted
-_RIVALS, _CLEARLY = 4, 1.1  # motions of two parts that are weighed, and by what factor one must be better than the next
+_RIVALS, _CLEARLY = 4, 1.25  # motions of two parts that are weighed, and by what factor one must be better than the next
 _LOOKED = 40       # pairs, the nearest, that are looked at of two parts before they are joined
 _NEAR = 20         # scans around each one, of a part, that are looked at
 
@@ -172,14 +172,18 @@ class Parts:
         return Motion(a, b, T, sum(known for known in said if known is not None), joins, unseen)
 
     def _astray(self, links: Links) -> Iterator[tuple[float, list[int], Motion]]:
-        """Where clear pairs say that scans of a part lie otherwise: what holds these and those that they should lie
-        with apart at the weakest seam, the scans on their side of it, and how they would lie."""
+        """Where clear pairs say that scans of a part lie otherwise: what holds these in their place, the scans, and how
+        they would lie. Those on their side of the weakest seam to where they should lie go together, or single ones."""
         for part in self._of_several():
             members = [int(k) for k in self._members(part)]
             for T, stay, go in self._complaints(part):
+                sides = [(T, [k]) for k in sorted(go)] + [(inverse(T), [k]) for k in sorted(stay)]
                 if stay - go and go - stay:
-                    held, side = seam(sorted(stay - go), sorted(go - stay), members, links)
-                    yield held, side, self._motion(part, part, T, np.setdiff1d(members, side), np.array(side))
+                    sides.append((T, seam(sorted(stay - go), sorted(go - stay), members, links)[1]))
+                for motion, side in sides:
+                    rest, those = np.setdiff1d(members, side), np.array(side)
+                    held = self._motion(part, part, np.eye(4), rest, those).says
+                    yield held, side, self._motion(part, part, motion, rest, those)
 
     def _complaints(self, part: int) -> list[tuple[Floats, set[int], set[int]]]:
         """Motions (4, 4) within a part that clear pairs ask for, the scans that would stay and those that would go."""
