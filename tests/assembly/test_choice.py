@@ -105,3 +105,19 @@ def test_what_is_unlike_is_not_tried():
 def test_in_order_the_next_is_tried_first():
     first = chosen(np.zeros((20, 20)), ordered=True).first()
     assert first == [(k, k + 1) for k in range(19)]
+
+
+def test_a_scan_left_alone_asks_those_without_hope_up_to_ten_pairs_a_scan():
+    """Forty scans in one component but for the last, of which glances saw nothing; the likeliest are asked first."""
+    likeness = np.zeros((41, 41))
+    likeness[40, 7] = likeness[7, 40] = 1e-4
+    choice = Choice(likeness, False, np.ones(41, bool))
+    assert choice.first() == []
+    component = np.r_[np.zeros(40, int), 1]
+    rounds = [choice.more(component) for _ in range(3)]
+    assert rounds[0][0] == (7, 40)
+    assert [len(pairs) for pairs in rounds] == [20, 20, 0]
+    assert {pair for pairs in rounds for pair in pairs} == {(k, 40) for k in range(40)}
+    many = Choice(likeness, False, np.ones(41, bool))
+    many.add([(i, j) for i in range(40) for j in range(i)][:400])
+    assert many.more(component) == []

@@ -26,7 +26,7 @@ _FOR, _AGAINST = 0.5, 10.0  # what a pair that wholly overlaps says where it is 
 _SAME = 2.0        # voxels: a pair says that the scans lie so, if they lie no further off
 _SURE, _JOINS = 0.1, 1.0  # what must speak for joining parts, with a certain pair between them, and without
 _BETTER = 0.1      # by so much must the sum grow where scans move or are parted
-_RIVALS, _CLEARLY = 4, 1.25  # motions of two parts that are weighed, and by what factor one must be better than the next
+_RIVALS, _CLEARLY = 4, 1.25  # motions of two parts that are weighed; by what factor one must be better than the next
 _LOOKED = 40       # pairs, the nearest, that are looked at of two parts before they are joined
 _NEAR = 20         # scans around each one, of a part, that are looked at
 
