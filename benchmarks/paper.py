@@ -19,8 +19,8 @@ import numpy as np
 
 import fieldalign as fa
 from fieldalign.evaluation import rotation_error, translation_error
-from fieldalign.experiments.ablation import ROWS, row_settings
 from fieldalign.experiments.published import ABLATION, PROGRAM_ABLATION
+from fieldalign.experiments.scenes.ablation import ROWS, row_settings
 from fieldalign.motions import apply, exp_twist
 
 DATA = Path(os.environ.get("FIELDALIGN_DATA", Path(__file__).parents[2] / "shared" / "data"))

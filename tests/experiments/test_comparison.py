@@ -10,10 +10,11 @@ import pytest
 
 from fieldalign.assembly.executor import Processes, Serial
 from fieldalign.errors import ArgumentError
-from fieldalign.experiments import Request, accuracy, trial
+from fieldalign.experiments import Request, trial
 from fieldalign.experiments.case import Case, Moved, spread
 from fieldalign.experiments.columns import Answer, ByPaper, Column
 from fieldalign.experiments.comparison import Comparison
+from fieldalign.experiments.objects import accuracy
 from fieldalign.experiments.tables import accuracy as table
 from fieldalign.motions import exp_twist
 from fieldalign.settings import PRESETS

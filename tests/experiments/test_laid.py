@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from fieldalign.evaluation import rotation_error
-from fieldalign.experiments import laid
 from fieldalign.experiments.data_sets import twists
 from fieldalign.experiments.data_sets.kitti import ScanPair
-from fieldalign.experiments.kitti import drawn_by_text
+from fieldalign.experiments.scenes import laid
+from fieldalign.experiments.scenes.kitti import drawn_by_text
 from fieldalign.motions import apply, inverse, log_motion
 
 

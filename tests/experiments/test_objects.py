@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 from fieldalign.cli import main
-from fieldalign.experiments import Request, efficiency, objects, pictures, robustness
+from fieldalign.experiments import Request, figures
 from fieldalign.experiments.alone import Alone
+from fieldalign.experiments.objects import common, efficiency, robustness
 from fieldalign.motions import apply
 
 SIMPLE = "modelnet40", "success-rate", "density", "noise"
@@ -21,7 +22,7 @@ SIMPLE = "modelnet40", "success-rate", "density", "noise"
 
 @pytest.fixture(autouse=True)
 def coarse(monkeypatch):
-    monkeypatch.setattr(pictures, "_DPI", 60)
+    monkeypatch.setattr(figures, "_DPI", 60)
 
 
 def experiment(name, data, output, *options):
@@ -48,7 +49,7 @@ def test_small_set_in_its_published_layout(name, small, tmp_path, monkeypatch):
 def test_modelnet40_takes_both_splits_and_both_sets_of_motions(small, tmp_path):
     _, found = experiment("modelnet40", small, tmp_path, "--columns", "paper")
     assert [(case["name"].split()[0], case["group"]) for case in found["cases"]] == [
-        (shape, group) for group in (objects.GTCSV, objects.AS_TEXT) for shape in ("piano_0001", "sofa_0001")]
+        (shape, group) for group in (common.GTCSV, common.AS_TEXT) for shape in ("piano_0001", "sofa_0001")]
     assert max(row["rre_deg"] for row in found["rows"]) < 1e-6
     text = (tmp_path / "modelnet40.md").read_text()
     assert "PointNetLK-Revisited" in text  # published, beside
@@ -60,7 +61,7 @@ def test_without_gt_poses_one_set_is_run_and_said(small, tmp_path):
     alone.mkdir()
     (alone / "ModelNet40").symlink_to(small / "ModelNet40")
     _, found = experiment("modelnet40", alone, tmp_path, "--columns", "paper")
-    assert {case["group"] for case in found["cases"]} == {objects.AS_TEXT}
+    assert {case["group"] for case in found["cases"]} == {common.AS_TEXT}
     assert "no gt_poses.csv" in (tmp_path / "modelnet40.md").read_text()
 
 

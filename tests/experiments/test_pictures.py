@@ -7,10 +7,10 @@ import pytest
 from scipy.spatial import cKDTree
 
 from fieldalign.assembly.executor import as_executor
-from fieldalign.experiments import NAMES, Request, pictures, run
-from fieldalign.experiments.distance_field import slice_of
-from fieldalign.experiments.floor_plan import floor_plan
-from fieldalign.experiments.pseudo_sets import drawn_sets
+from fieldalign.experiments import NAMES, Request, figures, run
+from fieldalign.experiments.pictures.distance_field import slice_of
+from fieldalign.experiments.pictures.floor_plan import floor_plan
+from fieldalign.experiments.pictures.pseudo_sets import drawn_sets
 from fieldalign.fields import PointField
 from fieldalign.reports.painting import Window
 
@@ -21,7 +21,7 @@ PICTURES = "distance-field", "pseudo-sets", "data-examples"
 @pytest.fixture(autouse=True)
 def coarse(monkeypatch):
     """Coarse pictures are drawn faster."""
-    monkeypatch.setattr(pictures, "_DPI", 60)
+    monkeypatch.setattr(figures, "_DPI", 60)
 
 
 def room(rng, count):
@@ -77,7 +77,7 @@ def test_png_pdf_and_what_is_shown(name, part, tmp_path):
     assert [file.name for file in report.files] == [f"{name}.png", f"{name}.pdf", f"{name}.json"]
     assert sorted(file.name for file in (tmp_path / "out").iterdir()) == sorted(file.name for file in report.files)
     image = imread(report.files[0])
-    assert image.shape[1] == round(60 * pictures.COLUMN)
+    assert image.shape[1] == round(60 * figures.COLUMN)
     assert 0.05 < (image[..., :3].min(axis=2) < 0.9).mean() < 0.95  # neither empty nor full
     assert report.files[1].read_bytes().startswith(b"%PDF")
     said = json.loads(report.files[2].read_text())

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from fieldalign.experiments import recall
 from fieldalign.experiments.case import Case
 from fieldalign.experiments.data_sets.three_d_match import FragmentPair
-from fieldalign.experiments.laid import Laid
 from fieldalign.experiments.results import Results
+from fieldalign.experiments.scenes import recall
+from fieldalign.experiments.scenes.laid import Laid
 from fieldalign.motions import apply, exp_twist, inverse, translation
 
 IDENTITY = np.eye(4)

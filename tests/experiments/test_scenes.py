@@ -7,8 +7,8 @@ import pytest
 
 import fieldalign as fa
 from fieldalign.cli import main
-from fieldalign.experiments.ablation import ROWS, row_settings
 from fieldalign.experiments.data_sets.three_d_match import ALIGNED_SCENES, SCENES
+from fieldalign.experiments.scenes.ablation import ROWS, row_settings
 from fieldalign.motions import apply, exp_twist, inverse
 from fieldalign.odometry.trajectory import Trajectory
 from fieldalign.odometry.trajectory_files import write_trajectory

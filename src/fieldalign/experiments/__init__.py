@@ -1,4 +1,4 @@
-"""The paper's experiments, one command each (docs/experiments.md): `EXPERIMENTS[name](request)` runs one."""
+"""The paper's experiments, one command each (docs/experiments.md): `run(name, request)` runs one."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ Run: TypeAlias = Callable[[Request], Report]
 
 # name on the command line: file and function there
 NAMES: dict[str, tuple[str, str]] = {
-    "modelnet40": ("accuracy", "MODELNET40"),
-    "shapenet": ("accuracy", "SHAPENET"),
-    "success-rate": ("accuracy", "SUCCESS_RATE"),
-    "efficiency": ("efficiency", "efficiency"),
-    "density": ("robustness", "DENSITY"),
-    "noise": ("robustness", "NOISE"),
-    "distance-field": ("distance_field", "distance_field"),
-    "pseudo-sets": ("pseudo_sets", "pseudo_sets"),
-    "data-examples": ("data_examples", "data_examples"),
-    "3dmatch": ("three_d_match", "EXPERIMENT"),
-    "kitti": ("kitti", "EXPERIMENT"),
-    "kitti-trajectory": ("kitti_trajectory", "run"),
-    "ablation": ("ablation", "EXPERIMENT"),
+    "modelnet40": ("objects.accuracy", "MODELNET40"),
+    "shapenet": ("objects.accuracy", "SHAPENET"),
+    "success-rate": ("objects.accuracy", "SUCCESS_RATE"),
+    "efficiency": ("objects.efficiency", "efficiency"),
+    "density": ("objects.robustness", "DENSITY"),
+    "noise": ("objects.robustness", "NOISE"),
+    "distance-field": ("pictures.distance_field", "distance_field"),
+    "pseudo-sets": ("pictures.pseudo_sets", "pseudo_sets"),
+    "data-examples": ("pictures.data_examples", "data_examples"),
+    "3dmatch": ("scenes.three_d_match", "EXPERIMENT"),
+    "kitti": ("scenes.kitti", "EXPERIMENT"),
+    "kitti-trajectory": ("scenes.trajectory", "run"),
+    "ablation": ("scenes.ablation", "EXPERIMENT"),
 }
 
 

@@ -77,6 +77,10 @@ class ByDefault:
         return Answer(result.T_target_source, result.accepted)
 
 
+PRIOR = Column("default", "fieldalign, from the guess, within 50 deg", ByDefault(50.0))
+ANY_POSE = Column("default-any-pose", "fieldalign, without a guess", ByDefault())
+
+
 @dataclass(frozen=True)
 class ByPeer:
     """A method of a folder of adapters, which is told a length that suits the data; it starts where ByPaper does."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..motions import Matrix
 from ..whole_file import replacing
-from . import pictures
+from . import figures
 from .measures import share_interval
 from .results import Results
 
@@ -56,8 +56,8 @@ def draw_levels(
             shares, counts = np.array([h.mean() for h in hits]), np.array([len(h) for h in hits])
             draw_line(axes, number, title, levels, shares, share_interval(shares, counts), marker="o")
         axes.set(xlabel=axis, ylabel="share of successes", ylim=(-0.02, 1.02))
-        axes.set_title(f"within {within[0]:g} deg and {within[1]:g}", fontsize=pictures.LARGE,
-                       color=pictures.INK, pad=3)
+        axes.set_title(f"within {within[0]:g} deg and {within[1]:g}", fontsize=figures.LARGE,
+                       color=figures.INK, pad=3)
         if log:
             axes.set_xscale("log")
     save(figure, panels, path)
@@ -65,7 +65,7 @@ def draw_levels(
 
 def new_panels(count: int, lines: int) -> tuple[Figure, list[Axes]]:
     """So many panels below each other, as wide as a column of print, with room for a legend of so many lines."""
-    figure = pictures.new_figure(pictures.COLUMN, count * _PANEL + (lines + 1) * _LINE)
+    figure = figures.new_figure(figures.COLUMN, count * _PANEL + (lines + 1) * _LINE)
     figure.set_layout_engine("constrained")
     panels = list(figure.subplots(count, 1, squeeze=False)[:, 0])
     for axes in panels:
@@ -73,9 +73,9 @@ def new_panels(count: int, lines: int) -> tuple[Figure, list[Axes]]:
         axes.spines[["left", "bottom"]].set(color="0.6", linewidth=0.6)
         axes.grid(color="0.92", linewidth=0.5)
         axes.set_axisbelow(True)
-        axes.tick_params(which="both", labelsize=pictures.SMALL, colors=pictures.INK, width=0.5, length=2)
-        axes.xaxis.label.set(size=pictures.LARGE, color=pictures.INK)
-        axes.yaxis.label.set(size=pictures.LARGE, color=pictures.INK)
+        axes.tick_params(which="both", labelsize=figures.SMALL, colors=figures.INK, width=0.5, length=2)
+        axes.xaxis.label.set(size=figures.LARGE, color=figures.INK)
+        axes.yaxis.label.set(size=figures.LARGE, color=figures.INK)
     return figure, panels
 
 
@@ -93,8 +93,8 @@ def draw_line(
 def save(figure: Figure, panels: list[Axes], path: Path) -> None:
     """Writes the figure with one legend below all panels, whole or not at all."""
     handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=1, frameon=False, fontsize=pictures.SMALL,
-                  labelcolor=pictures.INK, handlelength=3.0, labelspacing=0.2, borderaxespad=0.2)
+    figure.legend(handles, labels, loc="outside lower center", ncols=1, frameon=False, fontsize=figures.SMALL,
+                  labelcolor=figures.INK, handlelength=3.0, labelspacing=0.2, borderaxespad=0.2)
     with replacing(path) as unfinished:
         figure.savefig(unfinished, format=path.suffix[1:])
 

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..fields.protocol import Floats
-from ..motions import apply
-from ..reports import views
-from . import pictures
-from .case import spread
-from .data_sets import kitti, modelnet, shapenet, three_d_match
-from .data_sets.kitti_sequences import ScanPair
-from .data_sets.shapes import Shape
-from .data_sets.three_d_match import FragmentPair
-from .request import Report, Request
+from ...fields.protocol import Floats
+from ...motions import apply
+from ...reports import views
+from .. import figures
+from ..case import spread
+from ..data_sets import kitti, modelnet, shapenet, three_d_match
+from ..data_sets.kitti_sequences import ScanPair
+from ..data_sets.shapes import Shape
+from ..data_sets.three_d_match import FragmentPair
+from ..request import Report, Request
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -41,7 +41,7 @@ def data_examples(request: Request) -> Report:
     rooms = spread(three_d_match.pairs(request.data)[2:], _PAIRS)
     street = kitti.metres_apart(request.data)[0]
 
-    figure = pictures.new_figure(pictures.COLUMN, _HEIGHT)
+    figure = figures.new_figure(figures.COLUMN, _HEIGHT)
     rows = [_row(figure, row, count) for row, count in enumerate((_SHAPES, _SHAPES, _PAIRS, 1))]
     for panels, (name, found) in zip(rows, shapes.items(), strict=False):
         _name_row(panels[0], name)
@@ -56,7 +56,7 @@ def data_examples(request: Request) -> Report:
         axes.set_axis_off()
     shown = {name: [shape.name for shape in found] for name, found in shapes.items()}
     shown |= {"3DMatch": [pair.name for pair in rooms], "KITTI": [street.name]}
-    return pictures.write_picture(
+    return figures.write_picture(
         request, "data-examples", "Examples of every data set (Fig. 5 of the paper)",
         (f"Shapes: {_POINTS} of the points in black, and the surface.",
          "Pairs of scans at their true poses: target blue, source orange.",
@@ -75,7 +75,7 @@ def _drawn(found: Sequence[Shape], seed: int) -> list[Shape]:
 
 def _row(figure: Figure, row: int, count: int) -> list[Axes]:
     """Empty panels side by side."""
-    wide, high = pictures.COLUMN, _HEIGHT
+    wide, high = figures.COLUMN, _HEIGHT
     bottom = high - sum(_ROWS[: row + 1]) - row * _GAP
     width = (wide - _LEFT - count * _GAP) / count
     return [figure.add_axes(((_LEFT + k * (width + _GAP)) / wide, bottom / high, width / wide, _ROWS[row] / high))
@@ -83,7 +83,7 @@ def _row(figure: Figure, row: int, count: int) -> list[Axes]:
 
 
 def _name_row(axes: Axes, name: str) -> None:
-    axes.set_ylabel(name, fontsize=pictures.LARGE, color=pictures.INK, labelpad=2)
+    axes.set_ylabel(name, fontsize=figures.LARGE, color=figures.INK, labelpad=2)
 
 
 def _draw_shape(axes: Axes, shape: Shape, seed: int) -> None:
@@ -94,10 +94,10 @@ def _draw_shape(axes: Axes, shape: Shape, seed: int) -> None:
     up = np.array([0.0, 0.0, 1.0])
     view = views.obliquely(up, np.array([0.0, 1.0, 0.0]))
     width, height = _inches(axes)
-    window = pictures.framed(surface, view, height / width)
-    layers = [pictures.layer(surface, _SURFACE_COLOR, pictures.CLOSED),
-              pictures.balls(points, _POINT_COLOR, 0.005 * window.width)]
-    pictures.show_layers(axes, layers, view, window, width)
+    window = figures.framed(surface, view, height / width)
+    layers = [figures.layer(surface, _SURFACE_COLOR, figures.CLOSED),
+              figures.balls(points, _POINT_COLOR, 0.005 * window.width)]
+    figures.show_layers(axes, layers, view, window, width)
 
 
 def _draw_room(axes: Axes, pair: FragmentPair) -> None:
@@ -107,7 +107,7 @@ def _draw_room(axes: Axes, pair: FragmentPair) -> None:
     up = views.level(both, np.array([0.0, -1.0, 0.0]))  # the y axis of a camera looks down
     top = views.ceiling(both @ up)
     view = views.obliquely(up, views.ahead(np.zeros(3), both, up))
-    _draw_clouds(axes, [cloud[cloud @ up < top] for cloud in clouds], view, pictures.CLOSED)
+    _draw_clouds(axes, [cloud[cloud @ up < top] for cloud in clouds], view, figures.CLOSED)
 
 
 def _draw_street(axes: Axes, pair: ScanPair) -> None:
@@ -116,7 +116,7 @@ def _draw_street(axes: Axes, pair: ScanPair) -> None:
     across = np.cross(up, drive / np.linalg.norm(drive))
     frame = np.stack([-np.cross(up, across), across])
     clouds = [cloud[(np.abs(cloud @ frame.T) < _STREET).all(axis=1)] for cloud in _together(pair)]
-    _draw_clouds(axes, clouds, views.obliquely(up, across), pictures.SCAN)
+    _draw_clouds(axes, clouds, views.obliquely(up, across), figures.SCAN)
 
 
 def _together(pair: FragmentPair | ScanPair) -> list[Floats]:
@@ -127,13 +127,13 @@ def _together(pair: FragmentPair | ScanPair) -> list[Floats]:
 
 def _draw_clouds(axes: Axes, clouds: Sequence[Floats], view: Floats, covered: float) -> None:
     width, height = _inches(axes)
-    window = pictures.framed(np.concatenate(clouds), view, height / width)
-    layers = [pictures.layer(cloud, color, covered)
+    window = figures.framed(np.concatenate(clouds), view, height / width)
+    layers = [figures.layer(cloud, color, covered)
               for cloud, color in zip(clouds, (_SOURCE_COLOR, _TARGET_COLOR), strict=True)]
-    pictures.show_layers(axes, layers, view, window, width)
+    figures.show_layers(axes, layers, view, window, width)
 
 
 def _inches(axes: Axes) -> tuple[float, float]:
     """Width and height of a panel."""
     width, height = axes.get_position().size
-    return float(width) * pictures.COLUMN, float(height) * _HEIGHT
+    return float(width) * figures.COLUMN, float(height) * _HEIGHT

@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..fields import PointField
-from ..fields.protocol import Floats
-from ..reports import views
-from ..reports.painting import Window
-from . import pictures
-from .data_sets import kitti
-from .data_sets.files import points_of
+from ...fields import PointField
+from ...fields.protocol import Floats
+from ...reports import views
+from ...reports.painting import Window
+from .. import figures
+from ..data_sets import kitti
+from ..data_sets.files import points_of
+from ..request import Report, Request
 from .floor_plan import floor_plan
-from .request import Report, Request
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -52,7 +52,7 @@ def distance_field(request: Request) -> Report:
     map_slice = slice_of(PointField(np.c_[plan, np.zeros(len(plan))]), _around(plan), 0.0)
     scan_slice = slice_of(PointField(scan), _STREET, _HEIGHT)
 
-    figure = pictures.new_figure(pictures.COLUMN, 2.95)
+    figure = figures.new_figure(figures.COLUMN, 2.95)
     (a, b), (c, d) = figure.subplots(2, 2, gridspec_kw={
         "left": 0.01, "right": 0.93, "top": 0.985, "bottom": 0.07, "wspace": 0.04, "hspace": 0.18,
         "height_ratios": [map_slice.window.height / map_slice.window.width, _STREET.height / _STREET.width]})
@@ -62,11 +62,11 @@ def distance_field(request: Request) -> Report:
     _draw_scan(c, scan)
     _draw_field(d, scan_slice, _STREET_LINES, _STREET_TOP)
     for axes, length in ((a, 5.0), (c, 10.0)):
-        pictures.scale_bar(axes, length, f"{length:g} m")
+        figures.scale_bar(axes, length, f"{length:g} m")
     for axes, letter, text in ((a, "a", "map in the plane"), (b, "b", "its distance field"),
                                (c, "c", "KITTI scan"), (d, "d", "slice of its distance field")):
-        pictures.name_panel(axes, letter, text)
-    return pictures.write_picture(
+        figures.name_panel(axes, letter, text)
+    return figures.write_picture(
         request, "distance-field", "Distance fields (Fig. 3 of the paper)",
         (f"(a), (b): a simulated map of an office floor, {len(plan)} points, in place of the Intel map of the paper.",
          f"(c), (d): {pair.sequence}, scan {pair.i}, all of its {len(scan)} points; the slice lies {-_HEIGHT} m below "
@@ -87,7 +87,7 @@ def _around(plan: Floats) -> Window:
 def _limits(axes: Axes, window: Window) -> None:
     (x, y), w, h = window.middle, window.width / 2, window.height / 2
     axes.set(xlim=(x - w, x + w), ylim=(y - h, y + h), aspect="equal")
-    pictures.bare(axes)
+    figures.bare(axes)
 
 
 def _draw_map(axes: Axes, plan: Floats, window: Window) -> None:
@@ -99,9 +99,9 @@ def _draw_scan(axes: Axes, scan: Floats) -> None:
     """The scan from above, coloured by height."""
     near = scan[(np.abs(scan[:, :2] - _STREET.middle) < [_STREET.width / 2, _STREET.height / 2]).all(axis=1)]
     low, high = np.percentile(near[:, 2], (2, 98))
-    colors = pictures.colormap("cividis")(np.clip((near[:, 2] - low) / (high - low), 0, 1))[:, :3]
+    colors = figures.colormap("cividis")(np.clip((near[:, 2] - low) / (high - low), 0, 1))[:, :3]
     view = views.from_above(np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0]))
-    pictures.show_layers(axes, [pictures.layer(near, colors)], view, _STREET, pictures.COLUMN / 2)
+    figures.show_layers(axes, [figures.layer(near, colors)], view, _STREET, figures.COLUMN / 2)
 
 
 def _draw_field(axes: Axes, found: Slice, lines: tuple[float, ...], top: float) -> None:
@@ -112,4 +112,4 @@ def _draw_field(axes: Axes, found: Slice, lines: tuple[float, ...], top: float) 
     axes.contour(found.values, lines, colors="white", linewidths=0.35, alpha=0.8,
                  extent=extent)
     _limits(axes, found.window)
-    pictures.color_bar(axes, image, "m", open_ended=True)
+    figures.color_bar(axes, image, "m", open_ended=True)

@@ -11,21 +11,22 @@ from typing import Any
 
 import numpy as np
 
-from ..fields.protocol import Floats
-from ..motions import exp_twist
-from ..threads import resolve_threads
-from . import curves, objects, tables
-from .alone import Alone
-from .case import Case, Moved, spread
-from .columns import Answer
-from .comparison import Comparison
-from .data_sets import modelnet, twists
-from .data_sets.shapes import Shape
-from .published import BY_EXPERIMENT
-from .request import Report, Request
-from .results import Results, page, write_json, write_text
-from .tables import Cell, number
-from .trial import Trial
+from ...fields.protocol import Floats
+from ...motions import exp_twist
+from ...threads import resolve_threads
+from .. import curves, tables
+from ..alone import Alone
+from ..case import Case, Moved, spread
+from ..columns import ANY_POSE, PRIOR, Answer
+from ..comparison import Comparison
+from ..data_sets import modelnet, twists
+from ..data_sets.shapes import Shape
+from ..published import BY_EXPERIMENT
+from ..request import Report, Request
+from ..results import Results, page, write_json, write_text
+from ..tables import Cell, number
+from ..trial import Trial
+from . import common as objects
 
 _POINTS = 10_000
 _SHAPES = 5     # of which each is registered once by each method
@@ -37,7 +38,7 @@ _MIB = 2**20
 
 Growth = dict[int, Results]  # by the number of points
 
-_OWN = (objects.PRIOR, objects.ANY_POSE, objects.PAPER)
+_OWN = (PRIOR, ANY_POSE, objects.PAPER)
 _NAME = "efficiency"
 _PROTOCOL = (
     f"Time: {_POINTS:,} points of each of {_SHAPES} shapes of ModelNet40, and the same moved as the text says; "

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..fields import PointField
-from ..fields.protocol import Floats
-from ..pseudo import draw_pseudo_points
-from ..reports import views
-from ..settings import PRESETS, Settings
-from . import pictures
-from .data_sets import kitti, modelnet, three_d_match
-from .data_sets.files import points_of
-from .request import Report, Request
+from ...fields import PointField
+from ...fields.protocol import Floats
+from ...pseudo import draw_pseudo_points
+from ...reports import views
+from ...settings import PRESETS, Settings
+from .. import figures
+from ..data_sets import kitti, modelnet, three_d_match
+from ..data_sets.files import points_of
+from ..request import Report, Request
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -45,14 +45,14 @@ class PseudoSet:
 def pseudo_sets(request: Request) -> Report:
     """Draws the pseudo sets of the paper on a shape, a room and a street."""
     sets = drawn_sets(request)
-    height = 2 * (pictures.COLUMN / 2 * _SHAPE + 0.22)
-    figure = pictures.new_figure(pictures.COLUMN, height)
+    height = 2 * (figures.COLUMN / 2 * _SHAPE + 0.22)
+    figure = figures.new_figure(figures.COLUMN, height)
     grid = figure.subplots(2, 2, gridspec_kw={"left": 0.01, "right": 0.99, "top": 0.995, "bottom": 0.075,
                                               "wspace": 0.03, "hspace": 0.16})
     for axes, letter, found in zip(grid.ravel(), "abcd", sets, strict=True):
         _draw(axes, found)
-        pictures.name_panel(axes, letter, found.title)
-    return pictures.write_picture(
+        figures.name_panel(axes, letter, found.title)
+    return figures.write_picture(
         request, "pseudo-sets", "Pseudo sets on real clouds",
         ("Orange: 1000 pseudo points, drawn as the paper's method draws them; grey: the target cloud.",
          *(f"({letter}) {s.title}: {s.source}, {_in_words(s.settings)}."
@@ -64,7 +64,7 @@ def pseudo_sets(request: Request) -> Report:
 def drawn_sets(request: Request) -> list[PseudoSet]:
     """What is shown."""
     shape = modelnet.shapes(request.data)[0]
-    pair = pictures.example(three_d_match.pairs(request.data))
+    pair = figures.example(three_d_match.pairs(request.data))
     drive = kitti.successive(request.data)[0]
     room, street = points_of(pair.target), points_of(drive.target)
     down = np.array([0.0, 1.0, 0.0])  # of the cameras of 3DMatch
@@ -106,7 +106,7 @@ def _draw(axes: Axes, found: PseudoSet) -> None:
     up = views.level(points, found.up)
     view = views.obliquely(up, views.ahead(np.zeros(3), points, up))
     below = points @ up < views.ceiling(points @ up)
-    window = pictures.framed(np.concatenate([points[below], pseudo]), view, _SHAPE)
-    layers = [pictures.layer(points[below], _CLOUD_COLOR, pictures.SCAN if street else pictures.CLOSED),
-              pictures.balls(pseudo, _PSEUDO_COLOR, _RADIUS * window.width)]
-    pictures.show_layers(axes, layers, view, window, pictures.COLUMN / 2)
+    window = figures.framed(np.concatenate([points[below], pseudo]), view, _SHAPE)
+    layers = [figures.layer(points[below], _CLOUD_COLOR, figures.SCAN if street else figures.CLOSED),
+              figures.balls(pseudo, _PSEUDO_COLOR, _RADIUS * window.width)]
+    figures.show_layers(axes, layers, view, window, figures.COLUMN / 2)

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..fields.protocol import Floats
+from ...fields.protocol import Floats
 
 _SIZE = np.array([30.0, 21.0])  # metres
 _DEPTH, _CORRIDOR = 5.0, 2.0  # of the outer rooms, and how wide the corridor is

@@ -8,19 +8,19 @@ from typing import Any
 
 import numpy as np
 
-from ..assembly.record import RunRecord
-from ..assembly.work import Task
-from ..errors import DataSetError
-from ..evaluation import Evaluation, evaluate
-from ..motions import Matrix
-from ..odometry.trajectory import Trajectory
-from ..settings import PRESETS
-from . import results, tables
-from .alone import telling
-from .comparison import asked_of
-from .data_sets import kitti
-from .data_sets.kitti import KittiSequence
-from .request import Report, Request
+from ...assembly.record import RunRecord
+from ...assembly.work import Task
+from ...errors import DataSetError
+from ...evaluation import Evaluation, evaluate
+from ...motions import Matrix
+from ...odometry.trajectory import Trajectory
+from ...settings import PRESETS
+from .. import results, tables
+from ..alone import telling
+from ..comparison import asked_of
+from ..data_sets import kitti
+from ..data_sets.kitti import KittiSequence
+from ..request import Report, Request
 from .streams import Doing, ScanToScan, Stream, Work, has_kiss_icp
 
 NAME = "kitti-trajectory"
@@ -183,7 +183,7 @@ def _end_error(evaluation: Evaluation) -> float:
 
 def _picture(path: Path, evaluations: dict[str, Evaluation]) -> list[Path]:
     """Of no trajectory none."""
-    from ..reports.trajectory_picture import trajectories_picture
+    from ...reports.trajectory_picture import trajectories_picture
 
     if not evaluations:
         return []

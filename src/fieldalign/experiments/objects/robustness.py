@@ -8,16 +8,17 @@ from pathlib import Path
 
 import numpy as np
 
-from ..fields.protocol import Floats
-from ..motions import Matrix, apply, exp_twist
-from ..settings import PRESETS
-from . import curves, objects, tables
-from .case import Case, Clouds
-from .columns import ByPaper, Column
-from .comparison import Comparison
-from .data_sets import twists
-from .data_sets.shapes import Shape
-from .results import Results
+from ...fields.protocol import Floats
+from ...motions import Matrix, apply, exp_twist
+from ...settings import PRESETS
+from .. import curves, tables
+from ..case import Case, Clouds
+from ..columns import ANY_POSE, PRIOR, ByPaper, Column
+from ..comparison import Comparison
+from ..data_sets import twists
+from ..data_sets.shapes import Shape
+from ..results import Results
+from . import common as objects
 
 _SHARES = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001)
 _SIGMAS = (*(round(0.01 * k, 2) for k in range(1, 11)), 0.2)
@@ -133,7 +134,7 @@ DENSITY = Comparison(
         "The target is 200,000 points drawn from the surface, the source a random part of these, from all down to 200.",
         _MOTIONS, objects.GUESS, _THRESHOLD,
     ),
-    cases=_thinned, own=(objects.PRIOR, objects.ANY_POSE, objects.PAPER, objects.PAPER_NEAR), peers=objects.SOME_PEERS,
+    cases=_thinned, own=(PRIOR, ANY_POSE, objects.PAPER, objects.PAPER_NEAR), peers=objects.SOME_PEERS,
     voxel=objects.VOXEL, success=objects.NEAR, text=_table_of_density, draw=_draw_density, few=50,
 )
 
@@ -150,7 +151,7 @@ NOISE = replace(
     ),
     cases=_noisy, text=_table_of_noise, draw=_draw_noise, few=66,
     own=(
-        objects.PRIOR, objects.ANY_POSE, replace(objects.PAPER, title=f"{objects.PAPER.title}, k = 1"),
+        PRIOR, ANY_POSE, replace(objects.PAPER, title=f"{objects.PAPER.title}, k = 1"),
         Column("paper-k5", f"{objects.PAPER.title}, k = 5", ByPaper(replace(PRESETS["object"], neighbours=5))),
     ),
 )

@@ -19,13 +19,13 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from .. import _core
-from ..motions import Matrix, apply, inverse
-from . import measures
-from .case import Case
-from .data_sets.three_d_match import FragmentPair
+from ... import _core
+from ...motions import Matrix, apply, inverse
+from .. import measures
+from ..case import Case
+from ..data_sets.three_d_match import FragmentPair
+from ..results import Results, Row
 from .laid import Laid
-from .results import Results, Row
 
 LARGEST = 0.2  # m, of correspondences, root mean square
 THRESHOLDS = 15.0, 0.3  # degrees, metres

@@ -10,11 +10,11 @@ from typing import Protocol, TypeAlias
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ..clouds.thinning import thin
-from ..errors import DataSetError
-from ..fields.protocol import Floats
-from ..motions import Matrix, apply, exp_twist, inverse
-from .case import Case
+from ...clouds.thinning import thin
+from ...errors import DataSetError
+from ...fields.protocol import Floats
+from ...motions import Matrix, apply, exp_twist, inverse
+from ..case import Case
 
 
 class Pair(Protocol):

@@ -11,14 +11,14 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from ..assembly.work import Load
-from ..motions import Matrix
-from ..odometry import Odometry
-from ..register import register
-from ..settings import Settings
-from .columns import adapters
-from .data_sets.files import points_of
-from .data_sets.kitti import ScanPair
+from ...assembly.work import Load
+from ...motions import Matrix
+from ...odometry import Odometry
+from ...register import register
+from ...settings import Settings
+from ..columns import adapters
+from ..data_sets.files import points_of
+from ..data_sets.kitti import ScanPair
 
 REACH = 100.0  # m, of KITTI's sensor, that KISS-ICP is told
 

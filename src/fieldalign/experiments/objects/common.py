@@ -7,20 +7,17 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import DataSetError
-from ..motions import Matrix, exp_twist
-from ..settings import PRESETS
-from .case import Case, Moved
-from .columns import ByDefault, ByPaper, Column
-from .data_sets import modelnet, shapenet, twists
-from .data_sets.files import inside
-from .data_sets.shapes import Shape
+from ...errors import DataSetError
+from ...motions import Matrix, exp_twist
+from ...settings import PRESETS
+from ..case import Case, Moved
+from ..columns import ByPaper, Column
+from ..data_sets import modelnet, shapenet, twists
+from ..data_sets.files import inside
+from ..data_sets.shapes import Shape
 
 PAPER = Column("paper", "the paper's method, cube [-1, 1]^3", ByPaper(PRESETS["object"]))
 PAPER_NEAR = Column("paper-near", "the paper's method, cube [-0.5, 0.5]^3", ByPaper(PRESETS["object-near"]))
-PRIOR = Column("default", "fieldalign, from the guess, within 50 deg", ByDefault(50.0))
-ANY_POSE = Column("default-any-pose", "fieldalign, without a guess", ByDefault())
-
 PEERS = (
     "icp-point", "icp-plane", "icp", "gicp-plain", "gicp", "kiss", "ransac", "fgr", "filterreg", "svr", "cpd",
 )

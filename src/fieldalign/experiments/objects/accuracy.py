@@ -6,16 +6,18 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from . import curves, objects, tables
-from .case import Case
-from .comparison import Comparison
-from .data_sets import modelnet, shapenet
-from .data_sets.program_clouds import SYMMETRIC, program_clouds
-from .data_sets.twists import program_pairs
-from .published import BY_EXPERIMENT, Published
-from .results import Results
+from .. import curves, tables
+from ..case import Case
+from ..columns import ANY_POSE, PRIOR
+from ..comparison import Comparison
+from ..data_sets import modelnet, shapenet
+from ..data_sets.program_clouds import SYMMETRIC, program_clouds
+from ..data_sets.twists import program_pairs
+from ..published import BY_EXPERIMENT, Published
+from ..results import Results
+from . import common as objects
 
-_OWN = (objects.PRIOR, objects.ANY_POSE, objects.PAPER, objects.PAPER_NEAR)
+_OWN = (PRIOR, ANY_POSE, objects.PAPER, objects.PAPER_NEAR)
 _MOTIONS = (
     "Two sets of motions: row k of PointNetLK-Revisited's gt_poses.csv for shape k, which all turn by 40 degrees and "
     "are what the published figures are of; and drawn as the text says, up to 45 degrees and 0.8. The target is the "

@@ -6,17 +6,16 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from ..settings import PRESETS
-from . import tables
-from .columns import ByPaper, Column
-from .comparison import Comparison
-from .data_sets import three_d_match, twists
+from ...settings import PRESETS
+from .. import tables
+from ..columns import ANY_POSE, PRIOR, ByPaper, Column
+from ..comparison import Comparison
+from ..data_sets import three_d_match, twists
+from ..parts import Parts
+from ..published import BENCHMARK, THREE_D_MATCH
+from ..results import Results
 from .laid import LaidCases, aligned_then, as_they_lie, turned
-from .objects import ANY_POSE, PRIOR
-from .parts import Parts
-from .published import BENCHMARK, THREE_D_MATCH
 from .recall import THRESHOLDS, recalls
-from .results import Results
 
 VOXEL = 0.05  # m, that the peers are told
 SEARCHING = "kiss", "ransac", "fgr"

@@ -6,18 +6,17 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from ..settings import PRESETS, PseudoSet, Settings
-from . import tables
-from .case import Case
-from .columns import ByPaper, Column
-from .comparison import Comparison
-from .data_sets.three_d_match import demo_pair
-from .data_sets.twists import demo_motions
+from ...settings import PRESETS, PseudoSet, Settings
+from .. import tables
+from ..case import Case
+from ..columns import ANY_POSE, PRIOR, ByPaper, Column
+from ..comparison import Comparison
+from ..data_sets.three_d_match import demo_pair
+from ..data_sets.twists import demo_motions
+from ..parts import Parts
+from ..published import ABLATION, PROGRAM_ABLATION
+from ..results import Results
 from .laid import Laid, as_case
-from .objects import ANY_POSE, PRIOR
-from .parts import Parts
-from .published import ABLATION, PROGRAM_ABLATION
-from .results import Results
 from .three_d_match import ALIGNED, ALIGNED_CASES, VOXEL
 
 ROWS: dict[int, tuple[bool, bool, PseudoSet]] = {

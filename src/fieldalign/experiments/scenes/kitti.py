@@ -6,17 +6,16 @@ from typing import Any
 
 import numpy as np
 
-from ..motions import Matrix
-from ..settings import PRESETS
-from . import measures, tables
-from .columns import ByDefault, ByPaper, Column
-from .comparison import Comparison
-from .data_sets import kitti, twists
+from ...motions import Matrix
+from ...settings import PRESETS
+from .. import measures, tables
+from ..columns import ANY_POSE, ByDefault, ByPaper, Column
+from ..comparison import Comparison
+from ..data_sets import kitti, twists
+from ..parts import Parts
+from ..published import KITTI
+from ..results import Results
 from .laid import LaidCases, aligned_then, as_they_lie, turned_about_z
-from .objects import ANY_POSE
-from .parts import Parts
-from .published import KITTI
-from .results import Results
 
 VOXEL = 0.5  # m, that the peers are told
 SEARCHING = "kiss", "ransac"

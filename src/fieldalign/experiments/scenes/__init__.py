@@ -1,0 +1,1 @@
+"""Experiments on scenes: Tables II to IV, and the trajectory."""
