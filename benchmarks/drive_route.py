@@ -34,6 +34,7 @@ class Curve:
 
     def _take(self, xy: np.ndarray, closed: bool) -> None:
         self.xy, self.closed, self.length = xy, closed, STEP * (len(xy) - 1)
+        self._heading = np.unwrap(np.arctan2(*np.gradient(xy, axis=0).T[::-1]))
 
     def offset(self, left: float) -> Curve:
         """The curve beside it."""
@@ -52,15 +53,13 @@ class Curve:
     def at(self, arc: np.ndarray, left: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         """Places (n, 2), so far to the left of the curve, and headings (n,), rad, without jumps."""
         knots = np.arange(len(self.xy)) * STEP
-        heading = np.unwrap(np.arctan2(*np.gradient(self.xy, axis=0).T[::-1]))
-        yaw = np.interp(arc, knots, heading)
+        yaw = np.interp(arc, knots, self._heading)
         xy = np.stack([np.interp(arc, knots, c) for c in self.xy.T], -1)
         return xy + left * np.stack([-np.sin(yaw), np.cos(yaw)], -1), yaw
 
     def bending(self) -> np.ndarray:
         """Curvature (1/m) at each of its points."""
-        heading = np.unwrap(np.arctan2(*np.gradient(self.xy, axis=0).T[::-1]))
-        return gaussian_filter1d(np.abs(np.gradient(heading)) / STEP, 4)
+        return gaussian_filter1d(np.abs(np.gradient(self._heading)) / STEP, 4)
 
 
 def _resampled(xy: np.ndarray) -> np.ndarray:
