@@ -13,6 +13,7 @@ from fieldalign.evaluation import absolute_errors
 from fieldalign.motions import exp_twist, inverse, translation
 from fieldalign.odometry.keyframes import Keyframe, fused
 from fieldalign.odometry.loop_graph import between_keyframes
+from fieldalign.odometry.loop_search import LoopSearch
 
 RADIUS, EVERY, FRAMES = 20.0, 3.0, 56  # metres, metres, of them 42 once round
 SIGHT, VOXEL = 12.0, 0.5
@@ -148,6 +149,12 @@ def test_the_same_bits_at_any_number_of_threads(driven, closed):
     again = fa.close_loops(driven, threads=2)
     assert np.array_equal(again.trajectory.poses, closed.trajectory.poses)
     assert again.to_dict() == closed.to_dict()
+
+
+def test_what_was_seen_from_a_whole_stretch_has_no_viewpoint(driven):
+    around = LoopSearch(driven.keyframes, 0, 1).around(1)
+    assert len(around) > 100
+    assert around.viewpoint is None
 
 
 def test_progress_is_told(driven):

@@ -151,11 +151,12 @@ class LoopSearch:
         return track(local, _scan_of(now), guess, SteadyMotion(then.voxel), 1.0, is_rough=True)
 
     def around(self, k: int) -> PointCloud:
-        """The surface around a keyframe, in the sensor's frame, as it was seen on that visit."""
+        """The surface around a keyframe, in the sensor's frame, as it was seen on that visit, from a whole stretch of
+        the way: it has no viewpoint."""
         keyframe = self._keyframes[k]
         rows = np.flatnonzero(np.abs(self._gone - keyframe.gone) <= 2 * keyframe.radius)
         means, _, _ = surface_of([self._keyframes[int(row)] for row in rows], inverse(keyframe.pose) @ self.poses[rows])
-        return PointCloud(means[(means**2).sum(axis=1) < keyframe.radius**2], viewpoint=np.eye(4))
+        return PointCloud(means[(means**2).sum(axis=1) < keyframe.radius**2])
 
     def believed(self, chain: Chain) -> list[Edge]:
         """The loops that agree with the odometry and among each other, but for what it may have drifted."""
