@@ -1,11 +1,14 @@
 """The map of voxels and what is laid on it: planes as they are, steps as they should be."""
 
+import ctypes
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from fieldalign import _core
 from fieldalign.motions import exp_twist, inverse, log_motion, translation
+from fieldalign.odometry.track import _settings
 
 
 def scan_of(points, times=None):
@@ -205,3 +208,22 @@ def test_deskewing_goes_on_with_the_steps(rng):
     assert np.abs(log_motion(inverse(truth) @ found["motion"])).max() < 4e-3
     plain = voxels.track(scan_of(seen), start, np.zeros(3), None, 0.1, None, False, SETTINGS)
     assert np.abs(log_motion(inverse(truth) @ plain["motion"])).max() > 8e-3
+
+
+class Watched:
+    """A number that tells when a thread reads it; one that does not hold the interpreter's lock dies of that."""
+
+    def __init__(self, value, told):
+        self.value, self.told = value, told
+
+    def __float__(self):
+        self.told.append(ctypes.pythonapi.PyGILState_Check())
+        return float(self.value)
+
+
+def test_settings_are_read_while_the_lock_is_held():
+    voxels, scan, told = _core.VoxelMap(1.0), np.zeros((100, 4), np.float32), []
+    settings = _settings(1.0, 0.1, 5)
+    watched = {name: Watched(value, told) for name, value in settings.items() if name not in ("steps", "free_steps")}
+    voxels.track(scan, np.eye(4), np.zeros(3), None, 1.0, None, False, settings | watched)
+    assert told == [1] * len(watched)
