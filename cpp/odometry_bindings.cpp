@@ -122,6 +122,8 @@ nb::dict tracked(VoxelMap& map, Scan scan, Pose4 start, Values origin, std::opti
   result["points"] = found.scan.size();
   result["met"] = found.sums.met;
   result["on"] = found.sums.on;
+  result["away"] = found.sums.away;
+  result["middle"] = found.sums.middle;
   result["iterations"] = found.steps;
   result["scale"] = found.sums.scale;
   result["H"] = symmetric_array(found.sums.step.H);

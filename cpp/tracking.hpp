@@ -22,6 +22,8 @@ struct TrackSums {
   double scale = 0;
   int met = 0;  // pseudo points in a voxel with a plane
   int on = 0;   // of these, within four times the thickness of it
+  double away = 0;  // how far these are from it, at most twelve times the thickness each, summed up
+  double middle = 0;  // the median of how far those are that are not beyond the gate
 };
 
 // How widely residuals across a plane of this variance scatter, as a multiple of the least.
@@ -72,24 +74,31 @@ inline void add_along(StepSums<6>& sums, Vec3 x, Vec3 away, const MapPlane& plan
   for (const Vec3 axis : across(plane.normal)) sums.add(x, {dot(axis, away), 1, axis, axis}, spread, robust);
 }
 
+// Puts the values into another order.
+inline double median_of(std::vector<double>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
 // H, g and the totals of a step; the weights' scale is that of the residuals themselves, by their median.
 inline TrackSums track_sums(VoxelMap& map, std::span<const ScanPoint> scan, std::span<const std::int32_t> cells,
                             const Motion& pose, Vec3 origin, const TrackLoss& loss) {
   TrackSums sums;
   std::vector<Met> met;
-  std::vector<double> sizes;
-  met.reserve(scan.size()), sizes.reserve(scan.size());
+  std::vector<double> sizes, distances;
+  met.reserve(scan.size()), sizes.reserve(scan.size()), distances.reserve(scan.size());
   meet_planes(map, scan, cells, pose, origin, loss, [&](const Met& m) {
     ++sums.met;
     sums.on += std::abs(m.r) < 4 * loss.thickness;
+    sums.away += std::min(std::abs(m.r), 12 * loss.thickness);
     if (!(std::abs(m.r) <= loss.gate)) return;  // nor what is no number
     met.push_back(m);
-    sizes.push_back(std::abs(m.r) / m.spread);
+    sizes.push_back(std::abs(m.r) / m.spread), distances.push_back(std::abs(m.r));
   });
   if (met.empty()) return sums;
-  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
-  std::nth_element(sizes.begin(), middle, sizes.end());
-  sums.scale = std::max(loss.deviations * 1.4826 * *middle, loss.least_scale);
+  sums.scale = std::max(loss.deviations * 1.4826 * median_of(sizes), loss.least_scale);
+  sums.middle = median_of(distances);
   const RobustLoss robust{sums.scale, 0, loss.gate};
   for (const Met& m : met) {
     sums.step.add(m.x, {m.r, 1, m.plane->normal, m.plane->normal}, m.spread, robust);

@@ -15,22 +15,31 @@ from ..motions import exp_twist
 from .keyframes import Keyframe, Keyframes, fused
 from .measure import measure_of
 from .pace import Pace
+from .race import Race
 from .reason import Tracking
+from .record import Record
 from .result import OdometryResult
 from .scan import Scan, Sweep, sweep_of, thin_scan
 from .settings import OdometrySettings
+from .spin import Spin
 from .tracker import Placed, Tracker
 from .trajectory import Trajectory
+
+_MOVES = 0.2  # voxels a scan: slower, scans are hardly bent
+_STEADY = Tracking.TRACKED, Tracking.STANDSTILL, Tracking.DOUBTFUL, Tracking.SPARSE
 
 
 class Odometry:
     """Poses of a sensor that moves, scan by scan; the world is the frame of the first scan.
 
-    settings: an OdometrySettings, of which nothing has to be chosen. deskew: whether points are carried to one moment,
-    where their times are known. whole: whether the map of the whole drive is kept, not only what is around the sensor;
+    settings: an OdometrySettings, of which nothing has to be chosen. deskew: whether points are carried to one moment:
+    by their times or, where they have none, by how the scans themselves tell that the sensor spins; False: scans are
+    taken as they are. whole: whether the map of the whole drive is kept, not only what is around the sensor;
     `fa.close_loops` asks for it.
 
-    results: what is known of the pose of each step so far, OdometryResults. last: the latest; None before the first.
+    spin: how the sensor spins, where points come without times and the scans have told it; None otherwise.
+    results: what is known of the poses of the latest 1000 steps, OdometryResults. last: of the latest; None before the
+    first.
     """
 
     def __init__(
@@ -39,24 +48,28 @@ class Odometry:
         if not isinstance(settings, OdometrySettings | None):
             raise ArgumentError(f"settings must be an OdometrySettings or None, but is {settings!r}")
         self.settings, self.deskew = settings or OdometrySettings(), bool(deskew)
-        self.results: list[OdometryResult] = []
+        self.spin: Spin | None = None
+        self._record = Record()
         self._pace, self._ahead = Pace(), 0.0  # seconds from a sweep's stamp to its middle
         self._tracker: Tracker | None = None
         self._keyframes = Keyframes() if whole else None
+        self._race: Race | None = None
+        self._raced = 0.0  # voxels a scan, at which the last race was begun that told nothing
 
     @property
     def last(self) -> OdometryResult | None:
         """What is known of the latest pose."""
-        return self.results[-1] if self.results else None
+        return self._record.latest[-1] if self._record.latest else None
+
+    @property
+    def results(self) -> list[OdometryResult]:
+        """What is known of the poses of the latest 1000 steps."""
+        return list(self._record.latest)
 
     @property
     def trajectory(self) -> Trajectory:
-        """The stamps, poses and covariances so far; they are worked out here."""
-        steps, n = self.results, len(self.results)
-        return Trajectory(
-            np.array([step.stamp for step in steps]), np.reshape([step.pose for step in steps], (n, 4, 4)),
-            np.reshape([step.covariance for step in steps], (n, 6, 6)),
-        )
+        """The stamps, poses and covariances of all steps so far."""
+        return self._record.trajectory
 
     @property
     def map(self) -> PointCloud:
@@ -84,7 +97,8 @@ class Odometry:
         cloud: a PointCloud or points (N, 3), in the sensor's frame; rows that are not finite are missing returns. None:
             the scan is missing, and the pose is the prediction.
         times: (N,), seconds, when each point was seen (or the cloud's own): on any clock, or counted from the stamp or
-            from each sweep's beginning. With them the scan is deskewed: carried to the middle of the sweep.
+            from each sweep's beginning. With them the scan is deskewed: carried to the middle of the sweep. Without,
+            the first scans in motion tell whether the sensor spins, and the later ones are deskewed by that.
         stamp: seconds, the moment that the pose is for; None: the middle of the sweep.
 
         Raises ArgumentError for arrays of a wrong shape. A scan without points raises nothing: `last` says so.
@@ -100,23 +114,44 @@ class Odometry:
         if tracker.is_worn(scan):
             tracker = self._begun(sweep) or tracker
             scan = self._thinned(sweep, tracker)
+        seen = self._spun(scan)
         clock.lap("thin")
-        placed = tracker.place(scan, elapsed, self._pace.interval, event)     # Gauss-Newton (eq. 11 to 16)
+        placed = tracker.place(seen, elapsed, self._pace.interval, event)     # Gauss-Newton (eq. 11 to 16)
         if placed.reason is Tracking.EMPTY:
             placed = replace(placed, reason=_nothing(sweep))
         clock.lap("align")
-        tracker.motion.follow(placed.pose, placed.seconds if placed.hold else None)
-        if placed.reason.is_on_map:
-            points, sparse = scan.at_once(tracker.motion.velocity)
-            tracker.map.add(points, sparse, placed.pose)                      # the target's field has grown
-            if self._keyframes is not None:
-                self._keyframes.follow(len(self.results), placed.pose, points, tracker.map)
+        points = tracker.take(placed, seen)                                   # the target's field has grown
+        if self._keyframes is not None and points is not None:
+            self._keyframes.follow(len(self._record), placed.pose, points, tracker.map)
         clock.lap("map")
+        if self.deskew and sweep.times is None:
+            self._learn_spin(tracker, scan, placed)
+            clock.lap("spin")
         return self._told(placed, sweep, clock)
 
     def _thinned(self, sweep: Sweep, tracker: Tracker) -> Scan:
         wanted = tracker.pseudo_points(self.settings.pseudo_points)
         return thin_scan(sweep, tracker.measure, self.settings.points, wanted, self.deskew)
+
+    def _spun(self, scan: Scan) -> Scan:
+        """The scan, with times where it has none and they are known from how the sensor spins."""
+        if self.spin is None or scan.is_timed or not self.deskew:
+            return scan
+        return scan.seen_by(self.spin, self._pace.interval)
+
+    def _learn_spin(self, tracker: Tracker, scan: Scan, placed: Placed) -> None:
+        """Whether scans without times are bent, and how: a race tells, once the sensor moves. Where it told nothing,
+        there is another one once the sensor moves twice as fast."""
+        pace = tracker.motion.size(tracker.motion.velocity) * self._pace.interval / tracker.measure.voxel
+        if placed.reason not in _STEADY:
+            self._race = None
+        elif self._race is None and self.spin is None and pace > max(_MOVES, 2 * self._raced):
+            self._race = Race(tracker, pace)
+        elif self._race is not None:
+            taking = self._race.step(scan, placed, placed.seconds, self._pace.interval, pace > _MOVES)
+            self._tracker, self.spin = taking or tracker, self._race.leader
+            if self._race.is_over:
+                self._raced, self._race = self._race.pace, None
 
     def _begun(self, sweep: Sweep) -> Tracker | None:
         """A tracker, begun with a scan that tells the lengths of the drive; it goes on from the one before."""
@@ -132,7 +167,7 @@ class Odometry:
             self._ahead, ahead = sweep.middle - sweep.stamp, sweep.stamp - sweep.middle
             pose, now = pose @ exp_twist(ahead * self._tracker.motion.velocity), now + ahead
         found = placed.found
-        self.results.append(OdometryResult(
+        self._record.add(OdometryResult(
             pose, now, placed.reason, 0 if found is None else found.points, 0.0 if found is None else found.agreement,
             0 if found is None else found.iterations, clock.laps, placed.hold, placed.prediction,
         ))

@@ -51,6 +51,8 @@ class OdometryResult:
         against the map. Along what is not held it is that of the predictions since it last was."""
         if self._known is None:
             return self.prediction
+        if not self._known.unobservable.shape[1]:
+            return self._known.covariance
         lever = self._known.lever
         basis = np.linalg.qr(self._known.unobservable / lever)[0]
         onto_open = (lever * basis) @ (basis / lever).T

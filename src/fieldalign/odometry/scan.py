@@ -13,6 +13,7 @@ from ..clouds.cloud import PointCloud, as_points
 from ..errors import ArgumentError
 from ..fields.protocol import Floats
 from .measure import THINNING, Measure
+from .spin import Spin
 
 Rows = NDArray[np.float32]  # (., 4): a place in the sensor's frame, and seconds from the middle of the sweep
 
@@ -39,12 +40,14 @@ class Sweep:
 @dataclass(frozen=True, eq=False)
 class Scan:
     """points: (M, 4) for the fine map. sparse: (K, 4) of them, for the coarse one. pseudo: (L, 4) of these, on the
-    scan's surface: their own distance is zero by construction."""
+    scan's surface: their own distance is zero by construction. is_spun: its times are but those of a sensor that spins
+    steadily."""
 
     points: Rows
     sparse: Rows
     pseudo: Rows
     is_timed: bool
+    is_spun: bool = False
 
     @property
     def is_empty(self) -> bool:
@@ -55,12 +58,23 @@ class Scan:
         """The same as if the times were not known."""
         return replace(self, is_timed=False)
 
+    def seen_by(self, spin: Spin, seconds: float) -> Scan:
+        """The same, its points seen one after the other by a sensor that spins once in so many seconds."""
+        points, sparse, pseudo = (_timed(rows, spin, seconds) for rows in (self.points, self.sparse, self.pseudo))
+        return Scan(points, sparse, pseudo, is_timed=True, is_spun=True)
+
     def at_once(self, velocity: Floats) -> tuple[Rows, Rows]:
         """The points for the fine and the coarse map as seen in the middle of the sweep, the sensor moving at a twist
         (6,) a second."""
         if not self.is_timed:
             return self.points, self.sparse
         return _core.deskew(self.points, velocity), _core.deskew(self.sparse, velocity)
+
+
+def _timed(rows: Rows, spin: Spin, seconds: float) -> Rows:
+    timed = rows.copy()
+    timed[:, 3] = seconds * (spin.share(rows) - 0.5)
+    return timed
 
 
 def sweep_of(

@@ -38,7 +38,8 @@ class Matched:
 
     H, hold, scatter: (6, 6), as in cpp/linearise.hpp; stretch: by how much a step is lengthened. lever: the length over
     which turns and shifts are of one size; least_hold: of the least held direction, a share of the best one's.
-    points: how many pseudo points were aligned; met: that have a plane; on: of these, that lie on it.
+    points: how many pseudo points were aligned; met: that have a plane; on: of these, that lie on it;
+    away: how far they are from it (a length), none counted as more than 0.3 voxels, summed up; middle: the median.
     """
 
     motion: Floats
@@ -53,6 +54,8 @@ class Matched:
     points: int
     met: int
     on: int
+    away: float
+    middle: float
     iterations: int
 
     @cached_property

@@ -13,7 +13,7 @@ from .local_map import LocalMap
 from .measure import Measure, range_of
 from .motion import SteadyMotion
 from .reason import Tracking
-from .scan import Scan, Sweep
+from .scan import Rows, Scan, Sweep
 from .track import Matched, track
 
 _LEARNING = 6              # scans, from the first: little is known of the motion yet
@@ -23,6 +23,7 @@ _AS_GOOD = 0.9             # of the best score: of places that agree nearly as w
 _LEAST_AGREEMENT = 0.3     # of the pseudo points on known surface; with less, a scan is lost
 _LEAST_MET = 0.1           # of all pseudo points
 _DOUBTFUL = 0.8            # of the usual agreement; with less, a scan may lie elsewhere
+_DOUBTFUL_SPUN = 0.9       # where no clock tells of missing scans, and what is seen is straightened by the motion
 _SPARSE = 0.3              # of the usual number of points
 _EAGER = 0.1               # of the way that what is usual goes to the latest
 _USUAL_SHARE, _LEAST_SHARE = 0.67, 0.33  # of the pseudo points, that have a plane
@@ -129,6 +130,16 @@ class Tracker:
         self._agreement += (_EAGER if self._agreement else 1.0) * (found.agreement - self._agreement)
         return placed
 
+    def take(self, placed: Placed, scan: Scan) -> Rows | None:
+        """The motion goes on to where a scan was placed, and the map, the target's field, grows by it: by these points
+        (m, 4), as seen at once; None where the scan does not lie on it."""
+        self.motion.follow(placed.pose, placed.seconds if placed.hold else None)
+        if not placed.reason.is_on_map:
+            return None
+        points, sparse = scan.at_once(self.motion.velocity)
+        self.map.add(points, sparse, placed.pose)
+        return points
+
     def _begun(self, scan: Scan, guess: Floats, seconds: float) -> Placed:
         self._first, self._scans, self._points = scan, 1, len(scan.points)
         return Placed(guess, seconds, Tracking.FIRST if self._is_first else Tracking.RESTARTED, prediction=self._blind)
@@ -144,7 +155,8 @@ class Tracker:
             again = track(self.map, scan, guess, self.motion, seconds, True, self._held)
             found = max(found, again, key=lambda one: one.score)
         laid = _Laid(found, seconds, event)
-        if self._missed or event is not Tracking.TRACKED or found.agreement < _DOUBTFUL * self._agreement:
+        least = (_DOUBTFUL_SPUN if scan.is_spun else _DOUBTFUL) * self._agreement
+        if self._missed or event is not Tracking.TRACKED or found.agreement < least:
             return self._sought(scan, laid, interval)
         return laid
 

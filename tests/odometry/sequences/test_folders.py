@@ -243,7 +243,7 @@ def test_a_topic_is_of_bags_only(kitti):
 
 
 @pytest.mark.parametrize(("sweep", "expected"), [("clockwise", [0.5, 0.25, 0.0, 0.75]),
-                                                 ("counterclockwise", [0.5, 0.75, 1.0, 0.25])])
+                                                 ("counterclockwise", [0.5, 0.75, 0.0, 0.25])])
 def test_times_from_the_azimuth_where_they_are_asked_for(tmp_path, sweep, expected):
     """Points ahead, to the left, behind and to the right."""
     write(tmp_path, ["0", "1", "2"], ".ply", first=1)

@@ -15,10 +15,11 @@ import numpy as np
 from ...arguments import check_one_of
 from ...clouds.cloud import Array, PointCloud
 from ...motions import Matrix
+from ..spin import Spin
 from .sequence import Frame
 
-_TURNS = {"clockwise": -1.0, "counterclockwise": 1.0}
-SWEEPS = tuple(_TURNS)
+_SPINS = {"clockwise": Spin(-1, np.pi), "counterclockwise": Spin(1, np.pi)}
+SWEEPS = tuple(_SPINS)
 
 
 def check_sweep(sweep: str) -> None:
@@ -54,5 +55,4 @@ def _timed(cloud: PointCloud, stamp: float | None, sweep: str, period: float) ->
 
 def share_of_sweep(points: Array, sweep: str) -> Matrix:
     """How much of the sweep was over when each point (N, 3) was seen, 0 to 1."""
-    azimuth = np.nan_to_num(np.arctan2(points[:, 1], points[:, 0], dtype=float))
-    return np.asarray(0.5 + _TURNS[sweep] * azimuth / (2 * np.pi))
+    return np.asarray(np.nan_to_num(_SPINS[sweep].share(np.asarray(points, float)), nan=0.5))
