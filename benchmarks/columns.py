@@ -55,6 +55,16 @@ def _rounded(value):
 # ------------------------------------------------------------------------------------------------ reading
 
 
+def rows_in(columns: dict) -> list[dict]:
+    """The rows of what `Columns.lists` gave, each with its nested dicts; cells that are 0 for nothing stay so."""
+    count = max((len(column) for column in columns.values() if isinstance(column, list)), default=0)
+    return [{key: _at(column, k) for key, column in columns.items()} for k in range(count)]
+
+
+def _at(column, k: int):
+    return {key: _at(inner, k) for key, inner in column.items()} if isinstance(column, dict) else column[k]
+
+
 def numbers(column: list, rows: np.ndarray) -> np.ndarray:
     """The rows of a column as floats, None as NaN."""
     return np.array(column, float)[rows]

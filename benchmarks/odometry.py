@@ -1,14 +1,17 @@
 """LiDAR odometry beside KISS-ICP: real frames, simulated drives with exact truth, ten thousand frames, and faults.
 
     make bench-odometry         (or: python benchmarks/odometry.py --output docs/benchmarks)
-    python benchmarks/odometry.py --only drives --drives street --quick --keep --output /tmp/odometry
+    python benchmarks/odometry.py --only drives --drives street --modes deskewed --loops --keep
+    python benchmarks/odometry.py --quick --output /tmp/odometry
 
 Writes odometry.json (every figure), odometry.md (the tables that the docs quote) and odometry.png into the output
 folder, after each part. Real data: ../shared/data or $FIELDALIGN_DATA. The drives (benchmarks/drives.py) are made in
 /tmp/drives or --folder, one at a time, 6 GB each, and removed again; --keep leaves them, and those that are there are
-used as they are.
-Both methods get the same frames, one after the other, in one process on two cores; CPU time is of the process.
-fieldalign is told nothing, KISS-ICP the reach of the sensor. Two hours; --quick takes some minutes.
+used as they are. With --only, --drives, --modes and --methods what is measured replaces the same rows of an earlier
+run, and all others stay: the whole may be run drive by drive.
+The methods get the same frames, one after the other, in one process on two cores; CPU time is of the process.
+fieldalign is told nothing, KISS-ICP the reach of the sensor. An hour and a half on two free cores; --quick takes some
+minutes.
 """
 
 from __future__ import annotations
@@ -29,11 +32,12 @@ from pathlib import Path
 import numpy as np
 import odometry_report as report
 from any_pose import version_of
-from columns import Columns
+from columns import Columns, rows_in
 from odometry_faults import FAULTS, suffered
-from odometry_run import METHODS, Record, endured, run, taken
+from odometry_run import BOTH, Record, endured, run, taken
 from odometry_sets import Sequence, drive, judged, read, real
 from paper import _processor as processor
+from peers import odometry_prototype as prototype
 from scenes import DATA
 
 import fieldalign as fa
@@ -41,9 +45,11 @@ import fieldalign as fa
 REAL = "kitti00", "kittiraw_22f", "kittiraw_154f"
 PASSES = 5  # over the short real sequences: medians of time want frames
 DRIVES = "street", "loop", "tunnel", "park", "indoor"
-MODES = {"deskewed": True, "not deskewed": False, "still": False}  # still: frames without distortion and times
+# Whether frames have their times, and who is run on them. Without times KISS-ICP does not deskew.
+MODES = {"deskewed": (True, BOTH), "no times": (False, ("fieldalign", "rigid", "kiss"))}
 REACH = {"indoor": 20.0}  # metres, at which KISS-ICP drifts least there; 100 elsewhere, its default
-LONG, LAP, EVERY = 10_000, 2000, 100
+ON_DRIVES = "fieldalign", "rigid", "kiss"
+LONG, LONG_PEER, LAP, EVERY = 10_000, 2000, 2000, 100
 QUICK = 300  # frames of a drive
 
 _made: set[Path] = set()  # folders that were made by this run
@@ -56,14 +62,15 @@ def reach_of(name: str) -> float:
 # ------------------------------------------------------------------------------------------------ real frames
 
 
-def real_sets(arguments: argparse.Namespace) -> dict:
+def real_sets(arguments: argparse.Namespace, earlier: dict) -> dict:
     """A row for each sequence and method."""
     columns = Columns()
     for name in REAL:
         sequence = real(name)
         frames = [read(file) for file in sequence.files]
-        runs = [run(frames, False, 100.0) for _ in range(1 if arguments.quick else PASSES)]
-        for method in METHODS:
+        methods = (*BOTH, "prototype") if prototype.is_there() else BOTH
+        runs = [run(frames, False, 100.0, methods) for _ in range(1 if arguments.quick else PASSES)]
+        for method in methods:
             errors = judged(sequence, np.array(runs[0][method].poses))
             times = [taken(record[method]) for record in runs]
             middle = {key: float(np.median([row[key] for row in times])) for key in ("cpu_ms", "wall_ms")}
@@ -88,23 +95,31 @@ def in_short(row: dict) -> str:
 # ------------------------------------------------------------------------------------------------ simulated drives
 
 
-def drives(arguments: argparse.Namespace) -> dict:
-    """A row for each drive, mode and method."""
+def drives(arguments: argparse.Namespace, earlier: dict) -> dict:
+    """A row for each drive, mode and method; those of an earlier run stay where they are not measured again."""
+    kept = [row for row in rows_in(earlier.get("rows", {})) if not is_asked_for(row, arguments)]
     columns = Columns()
+    for row in kept:
+        columns.add(**row)
     for name in arguments.drives:
-        for still in (False, True):
-            sequence = made(name, arguments, still)
-            points = int(np.median([len(frame.points) for frame in map(read, sequence.files[::50])]))
-            for mode in [m for m in MODES if (m == "still") == still]:
-                records = run(sequence.frames(still), MODES[mode], reach_of(name), loops=arguments.loops)
-                for method, record in records.items():
-                    row = _size(sequence, points) | judged(sequence, np.array(record.poses)) | taken(record)
-                    row |= after_loops(sequence, record)
-                    columns.add(drive=name, mode=mode, method=method, **row)
-                    said = row["moment"], row["said"], loops_in_short(row)
-                    print(name, mode, method, in_short(row), *said, flush=True)
-            remove(name, arguments, still)
-    return {"rows": columns.lists()}
+        sequence = made(name, arguments)
+        points = int(np.median([len(frame.points) for frame in map(read, sequence.files[::50])]))
+        for mode in arguments.modes:
+            has_times, methods = MODES[mode]
+            asked = [method for method in methods if method in arguments.methods]
+            records = run(sequence.frames(not has_times), True, reach_of(name), asked, arguments.loops)
+            for method, record in records.items():
+                row = _size(sequence, points) | judged(sequence, np.array(record.poses)) | taken(record)
+                row |= after_loops(sequence, record)
+                columns.add(drive=name, mode=mode, method=method, **row)
+                said = row["moment"], row["said"], loops_in_short(row)
+                print(name, mode, method, in_short(row), *said, flush=True)
+        remove(name, arguments)
+    return {"rows": columns.lists(), "seconds": earlier.get("seconds", 0.0)}
+
+
+def is_asked_for(row: dict, arguments: argparse.Namespace) -> bool:
+    return row["drive"] in arguments.drives and row["mode"] in arguments.modes and row["method"] in arguments.methods
 
 
 def after_loops(sequence: Sequence, record: Record) -> dict:
@@ -118,12 +133,12 @@ def loops_in_short(row: dict) -> str:
     return "" if row["loops_ate_m"] is None else f"loops: ATE {row['loops_ate_m']:.3f} m, {row['closing_s']:.1f} s"
 
 
-def made(name: str, arguments: argparse.Namespace, still: bool, frames: int | None = None) -> Sequence:
+def made(name: str, arguments: argparse.Namespace, frames: int | None = None) -> Sequence:
     """The drive, made by another process if it is not there yet."""
-    folder = folder_of(name, arguments, still)
+    folder = arguments.folder / name
     frames = frames or (QUICK if arguments.quick else sys.maxsize)
     if there(folder) < frames:
-        options = ["--still"] * still + ([] if frames == sys.maxsize else ["--frames", str(frames)])
+        options = [] if frames == sys.maxsize else ["--frames", str(frames)]
         command = [sys.executable, str(Path(__file__).with_name("drives.py")), name, str(folder), *options]
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
         _made.add(folder)
@@ -139,13 +154,9 @@ def there(folder: Path) -> int:
         return sys.maxsize if count == poses["of"] else count
 
 
-def folder_of(name: str, arguments: argparse.Namespace, still: bool) -> Path:
-    return arguments.folder / (f"{name}-still" if still else name)
-
-
-def remove(name: str, arguments: argparse.Namespace, still: bool) -> None:
+def remove(name: str, arguments: argparse.Namespace) -> None:
     """Unless it was there before, or is to stay."""
-    folder = folder_of(name, arguments, still)
+    folder = arguments.folder / name
     if folder in _made and not arguments.keep:
         shutil.rmtree(folder)
 
@@ -153,30 +164,35 @@ def remove(name: str, arguments: argparse.Namespace, still: bool) -> None:
 # ------------------------------------------------------------------------------------------------ endurance, faults
 
 
-def endurance(arguments: argparse.Namespace) -> dict:
-    """Memory and speed of each method alone, to and fro over a drive."""
-    frames, lap = (2 * QUICK, QUICK) if arguments.quick else (LONG, LAP)
-    sequence = made("loop", arguments, True, lap)
-    found = {}
-    for name in METHODS:
+def endurance(arguments: argparse.Namespace, earlier: dict) -> dict:
+    """Memory and speed of each method alone, to and fro over a drive; the peer for fewer frames."""
+    lap = QUICK if arguments.quick else LAP
+    lengths = dict.fromkeys(BOTH, 2 * QUICK) if arguments.quick else dict(zip(BOTH, (LONG, LONG_PEER), strict=True))
+    sequence, found = made("loop", arguments, lap), dict(earlier.get("methods", {}))
+    for name, frames in lengths.items():
+        if name not in arguments.methods:
+            continue
         with ProcessPoolExecutor(1, get_context("spawn")) as pool:
             found[name] = pool.submit(endured, name, sequence.files, frames, EVERY, 100.0).result()
         print(name, found[name]["pass_cpu_ms"], found[name]["rss_mib"][:: len(found[name]["rss_mib"]) // 5], flush=True)
-    remove("loop", arguments, True)
-    return {"frames": frames, "lap": len(sequence), "methods": found}
+    remove("loop", arguments)
+    return {"lap": len(sequence), "methods": found}
 
 
-def faults(arguments: argparse.Namespace) -> dict:
+def faults(arguments: argparse.Namespace, earlier: dict) -> dict:
     """A row for each fault and method; a method that does not survive has its process to itself."""
-    sequence, columns = made("street", arguments, False, 1000), Columns()
+    sequence, columns = made("street", arguments, 1000), Columns()
+    for row in rows_in(earlier.get("rows", {})):
+        if row["method"] not in arguments.methods:
+            columns.add(**row)
     for key, fault in FAULTS.items():
-        for method in METHODS:
+        for method in (m for m in BOTH if m in arguments.methods):
             with ProcessPoolExecutor(1, get_context("spawn")) as pool:
                 row = pool.submit(suffered, sequence, fault, method, 100.0)
                 row = row.result() if row.exception() is None else failed(row.exception())
             columns.add(fault=key, method=method, **row)
             print(fault.title, method, row, flush=True)
-    remove("street", arguments, False)
+    remove("street", arguments)
     return {"rows": columns.lists()}
 
 
@@ -193,6 +209,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--only", nargs="+", choices=list(PARTS), help="parts to measure; the others are kept")
     parser.add_argument("--drives", nargs="+", choices=DRIVES, default=DRIVES, help="drives to measure")
+    parser.add_argument("--modes", nargs="+", choices=list(MODES), default=list(MODES), help="modes to measure them in")
+    parser.add_argument("--methods", nargs="+", choices=ON_DRIVES, default=ON_DRIVES,
+                        help="methods to measure; on real frames all are")
     parser.add_argument("--quick", action="store_true", help=f"the first {QUICK} frames of the drives")
     parser.add_argument("--loops", action="store_true", help="close the loops of the drives at their end, too")
     parser.add_argument("--folder", type=Path, default=Path("/tmp/drives"), help="where the drives are made")
@@ -207,8 +226,9 @@ def main() -> None:
     results |= head(arguments.quick)
     for name in arguments.only or PARTS:
         start = time.perf_counter()
-        results[name] = PARTS[name](arguments)
-        results[name]["seconds"] = time.perf_counter() - start
+        measured = PARTS[name](arguments, results.get(name, {}))
+        seconds = measured.get("seconds", 0.0) + time.perf_counter() - start
+        results[name] = measured | {"seconds": seconds}
         report.write(results, arguments.output)
     print(report.as_markdown(results))
 

@@ -16,10 +16,11 @@ import fieldalign as fa
 
 REST = 0.003  # seconds between two methods, in which the threads of the first one go to sleep
 PAGE = os.sysconf("SC_PAGE_SIZE")
+PERIOD = 0.1  # seconds, of the simulated sensors
 
 
 class Fieldalign:
-    """fieldalign, told nothing."""
+    """fieldalign, told nothing. Where frames have no times, it finds out by itself whether the sensor spins."""
 
     def __init__(self, deskew: bool, reach: float, loops: bool = False) -> None:
         self.odometry = fa.Odometry(deskew=deskew, whole=loops)
@@ -31,6 +32,13 @@ class Fieldalign:
     def closed(self) -> np.ndarray | None:
         """The poses (n, 4, 4) after the loops were closed."""
         return fa.close_loops(self.odometry, threads=THREADS).trajectory.poses
+
+
+class Rigid(Fieldalign):
+    """fieldalign, told to take each scan as it is."""
+
+    def __init__(self, deskew: bool, reach: float, loops: bool = False) -> None:
+        super().__init__(False, reach, loops)
 
 
 class KissIcp:
@@ -50,7 +58,25 @@ class KissIcp:
         return lambda: self.odometry.step(points, frame.times), lambda: ""
 
 
-METHODS = {"fieldalign": Fieldalign, "kiss": KissIcp}
+class Prototype:
+    """The prototype, on frames as they are."""
+
+    def __init__(self, deskew: bool, reach: float, loops: bool = False) -> None:
+        from peers.odometry_prototype import Odometry
+
+        self.odometry = Odometry()
+
+    def step(self, frame: Frame) -> tuple[Callable[[], np.ndarray], Callable[[], str]]:
+        points = np.ascontiguousarray(frame.points, np.float32)
+        return lambda: self.odometry.step(points), lambda: ""
+
+    def closed(self) -> np.ndarray | None:
+        """It closes no loops."""
+        return None
+
+
+METHODS = {"fieldalign": Fieldalign, "rigid": Rigid, "kiss": KissIcp, "prototype": Prototype}
+BOTH = "fieldalign", "kiss"
 
 
 @dataclass
@@ -74,7 +100,7 @@ class Record:
 
 
 def run(
-    frames: Iterable[Frame], deskew: bool, reach: float, methods: Iterable[str] = METHODS, loops: bool = False
+    frames: Iterable[Frame], deskew: bool, reach: float, methods: Iterable[str] = BOTH, loops: bool = False
 ) -> dict[str, Record]:
     """Every method on every frame; which goes first changes from frame to frame. Loops are closed at the end."""
     running = {name: METHODS[name](deskew, reach, loops) for name in methods}
@@ -102,18 +128,28 @@ def taken(record: Record) -> dict:
     }
 
 
+def _to_and_fro(files: list[Path], k: int) -> Frame:
+    """Frame k of a drive that goes on backwards in time from its last file, and so on; its clock goes on, too."""
+    turn, place = divmod(k, len(files))
+    frame = read(files[place if turn % 2 == 0 else -1 - place])
+    if turn % 2 == 0:
+        return Frame(frame.points, frame.times + turn * len(files) * PERIOD)
+    return Frame(frame.points, (turn + 1) * len(files) * PERIOD - frame.times)
+
+
 def endured(name: str, files: list[Path], frames: int, every: int, reach: float) -> dict:
     """One method alone, in a process of its own, to and fro over the files, until so many frames are done.
 
     Lists with an entry for each `every` frames: the memory of the process, MiB, and the median CPU time, ms.
     """
-    method, record, memory = METHODS[name](False, reach), Record(), []
+    method, took, memory = METHODS[name](True, reach), np.zeros(frames), []
     for k in range(frames):
-        turn, place = divmod(k, len(files))
-        frame = read(files[place if turn % 2 == 0 else -1 - place])
-        record.take(*method.step(Frame(frame.points, None)))
+        record = Record()  # one for each frame: it is not to count as memory
+        record.take(*method.step(_to_and_fro(files, k)))
+        took[k] = record.cpu_ms[0]
         if (k + 1) % every == 0:
             memory.append(int(Path("/proc/self/statm").read_text().split()[1]) * PAGE / 2**20)
-    cpu = np.array(record.cpu_ms)[: len(memory) * every].reshape(-1, every)
-    passes = [float(np.median(record.cpu_ms[k : k + len(files)])) for k in range(0, frames, len(files))]
-    return {"every": every, "rss_mib": memory, "cpu_ms": np.median(cpu, axis=1).tolist(), "pass_cpu_ms": passes}
+    cpu = np.median(took[: len(memory) * every].reshape(-1, every), axis=1)
+    passes = [float(np.median(took[k : k + len(files)])) for k in range(0, frames, len(files))]
+    times = {"cpu_ms": cpu.tolist(), "pass_cpu_ms": passes}
+    return {"frames": frames, "every": every, "rss_mib": memory} | times
