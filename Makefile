@@ -35,7 +35,7 @@ bench-assemble:                   ## many scans: real sets and a heap of them be
 	$(MAKE) VENV=$(VENV)-bench $(VENV)-bench/.installed-bench,dask
 	$(VENV)-bench/bin/python benchmarks/assemble.py --output docs/benchmarks
 
-bench-odometry:                   ## real frames, simulated drives, endurance and faults, beside KISS-ICP; two hours
+bench-odometry:                   ## real frames, simulated drives, endurance and faults, beside KISS-ICP; an hour and a half
 	$(MAKE) VENV=$(VENV)-bench $(VENV)-bench/.installed-bench
 	$(VENV)-bench/bin/python benchmarks/odometry.py --loops --output docs/benchmarks
 
