@@ -171,6 +171,12 @@ class PreparedCloud:
             self._features = dict([*self._features.items(), (key, known)][-_KEPT:])
         return known
 
+    @property
+    def last_pseudo_points(self) -> Floats | None:
+        """The pseudo points (L, 3) that the paper's method asked of this cloud last; None: none yet."""
+        known = list(self._features.values())
+        return known[-1][0] if known else None
+
 
 def _moments(cloud: PointField) -> Floats:
     """Mean squared and mean fourth power of the distances to the mean, (2,): no motion and no order changes them."""

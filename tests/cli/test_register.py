@@ -387,3 +387,18 @@ def test_freedoms_that_are_none_are_one_line(call, options, words):
     answer = call("register", "source.ply", "target.npy", *options)
     assert is_one_error(*answer)
     assert words in answer[2]
+
+
+def test_a_report_is_written_and_names_both_files(call, scans):
+    folder, _ = scans
+    code, _, _ = call("register", "source.ply", "target.npy", "--report", "report.html")
+    assert code == 0
+    text = (folder / "report.html").read_text("utf-8")
+    assert "<h1>source.ply onto target.npy</h1>" in text
+    assert "Accepted" in text
+
+
+def test_a_report_that_cannot_be_written_is_told_before_any_work(call, scans):
+    code, _, err = call("register", "missing.ply", "target.npy", "--report", "report.txt")
+    assert code == 1
+    assert err == "Error: a report must end in .html, but is 'report.txt'\n"

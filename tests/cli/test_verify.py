@@ -106,3 +106,10 @@ def test_an_error_of_the_user_is_one_line_and_leaves_nothing(call, scans, argume
     assert is_one_error(*answer)
     assert words in answer[2]
     assert set(scans[0].rglob("*")) == before
+
+
+def test_a_report_says_that_a_wrong_pose_is_not_accepted(call, scans):
+    folder, _ = scans
+    status, _, err = call("verify", "source.ply", "target.ply", "wrong.txt", "--report", "report.html")
+    assert (status, err) == (3, "")
+    assert "Not accepted" in (folder / "report.html").read_text("utf-8")

@@ -56,6 +56,14 @@ def check_picture(path: str | None) -> None:
         checked_path(path)
 
 
+def check_report(path: str | None) -> None:
+    """Raises where a page cannot be written to a path."""
+    if path is not None:
+        from ..reports.page import checked_page_path
+
+        checked_page_path(path)
+
+
 def write_moved(path: str, source: Shape, T: Matrix) -> None:
     """Writes a cloud, or the triangles of a mesh, moved by T (4, 4)."""
     if isinstance(source, MeshField):

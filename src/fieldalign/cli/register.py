@@ -10,8 +10,10 @@ import fieldalign as fa
 
 from ..errors import ArgumentError
 from ..fields.files import read_shape
+from ..prepare import prepare_pair
+from ..threads import resolve_threads
 from .answers import tell, write_json
-from .files import check_output, check_picture, drawn, write_moved
+from .files import check_output, check_picture, check_report, drawn, write_moved
 from .poses import read_dof, read_pose
 from .progress import stages
 
@@ -29,6 +31,7 @@ from .progress import stages
 @click.option("--output", type=click.Path(), help="Write the source, moved into the target's frame, to this file.")
 @click.option("--json", "json_path", type=click.Path(allow_dash=True), help="Write the result as JSON; - for stdout.")
 @click.option("--picture", type=click.Path(), help="Draw both clouds before and after (.png, .svg, .pdf).")
+@click.option("--report", type=click.Path(), help="Write a page with all of it, in 3D, to keep (.html).")
 @click.option("--method", type=click.Choice(["robust", "paper"]), default="robust", show_default=True,
               help="robust: from any pose; paper: as published, from --init or the centroids.")
 @click.option("--settings", type=click.Choice(list(fa.PRESETS)), help="Of the paper's method.  [default: indoor]")
@@ -49,6 +52,7 @@ def command(
     output: str | None,
     json_path: str | None,
     picture: str | None,
+    report: str | None,
     method: str,
     settings: str | None,
     length_scale: float | None,
@@ -65,6 +69,7 @@ def command(
     free = read_dof(dof, dof_axis, dof_centre)
     check_output(output)
     check_picture(picture)
+    check_report(report)
     with stages("reading source", "reading target", "aligning", "writing") as stage:
         stage()
         source_shape = read_shape(source)
@@ -72,8 +77,9 @@ def command(
         stage()
         target_shape = read_shape(target)
         stage()
+        pair = prepare_pair(source_shape, target_shape, resolve_threads(threads), True)
         result = fa.register(
-            source_shape, target_shape, init=guess, search_radius=search_radius, search_angle=search_angle,
+            *pair, init=guess, search_radius=search_radius, search_angle=search_angle,
             method=method, settings=chosen, seed=seed, threads=threads, dof=free, scale=scale,
         )
         stage()
@@ -84,6 +90,10 @@ def command(
 
             title = f"{Path(source).name} onto {Path(target).name}: {result.reason.value}, overlap {result.overlap:.0%}"
             before_and_after(drawn(source_shape), drawn(target_shape), result.T_target_source, picture, title)
+        if report is not None:
+            from ..reports import write_report
+
+            write_report(result, *pair, report, f"{Path(source).name} onto {Path(target).name}")
         write_json(result, json_path)
     return tell(result, json_path)
 

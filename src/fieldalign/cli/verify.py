@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import click
 
 import fieldalign as fa
 
 from ..fields.files import read_shape
+from ..prepare import prepare_pair
+from ..threads import resolve_threads
 from .answers import tell, write_json
+from .files import check_report
 from .poses import read_pose
 from .progress import stages
 
@@ -19,22 +24,31 @@ from .progress import stages
 @click.option("--search/--no-search", default=True, show_default=True,
               help="Search all poses for one that agrees as well, or try only some around the given one.")
 @click.option("--json", "json_path", type=click.Path(allow_dash=True), help="Write the result as JSON; - for stdout.")
+@click.option("--report", type=click.Path(), help="Write a page with all of it, in 3D, to keep (.html).")
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of every random draw.")
 @click.option("--threads", type=int, default=None, help="How many threads; all cores by default.")
 def command(
-    source: str, target: str, pose: str, search: bool, json_path: str | None, seed: int, threads: int | None
+    source: str, target: str, pose: str, search: bool, json_path: str | None, report: str | None, seed: int,
+    threads: int | None,
 ) -> int:
     """Judge the POSE that brings SOURCE onto TARGET: T_target_source in a .txt, .npy or .json, or 16 numbers.
 
     Exit status 0: it may be used; 3: it may not, and why.
     """
     T_target_source = read_pose(pose, "pose")
+    check_report(report)
     with stages("reading source", "reading target", "judging") as stage:
         stage()
         source_shape = read_shape(source)
         stage()
         target_shape = read_shape(target)
         stage()
-        result = fa.verify(source_shape, target_shape, T_target_source, search=search, seed=seed, threads=threads)
+        pair = prepare_pair(source_shape, target_shape, resolve_threads(threads), True)
+        result = fa.verify(*pair, T_target_source, search=search, seed=seed, threads=threads)
         write_json(result, json_path)
+        if report is not None:
+            from ..reports import write_report
+
+            title = f"{Path(source).name} onto {Path(target).name}, a given pose"
+            write_report(result, *pair, report, title)
     return tell(result, json_path)

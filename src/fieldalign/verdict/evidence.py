@@ -42,17 +42,22 @@ class Evidence:
     off: float
 
     @property
+    def factors(self) -> dict[str, float]:
+        """By what factor each piece of evidence exceeds what is asked of it: enough from 1 on."""
+        return {
+            "met": self.met / MIN_MET,
+            "agreeing": self.agreeing / MIN_AGREEING,
+            "margin": self.margin / MIN_MARGIN,
+            "seen_through": MAX_SEEN_THROUGH / max(self.seen_through or 0.0, 1e-9),
+            "hold": self.hold / MIN_HOLD,
+            "off": MAX_OFF / max(self.off, 1e-9),
+        }
+
+    @property
     def strength(self) -> float:
-        """The smallest factor by which a piece of evidence exceeds what is asked of it: accepted from 1 on."""
-        factors = (
-            self.margin / MIN_MARGIN,
-            self.agreeing / MIN_AGREEING,
-            self.met / MIN_MET,
-            self.hold / MIN_HOLD,
-            MAX_SEEN_THROUGH / max(self.seen_through or 0.0, 1e-9),
-            MAX_OFF / max(self.off, 1e-9),
-        )
-        return 0.0 if any(np.isnan(factors)) else float(min(factors))
+        """The smallest of the factors by which the evidence exceeds what is asked of it: accepted from 1 on."""
+        factors = self.factors.values()
+        return 0.0 if any(np.isnan(factor) for factor in factors) else float(min(factors))
 
     @property
     def reason(self) -> Reason:
