@@ -92,7 +92,7 @@
     target: added(data.clouds.target, "target", data.clouds.target.spacing),
   };
   if (data.pseudo) {
-    const spacing = 2 * Math.max(data.clouds.source.spacing, data.clouds.target.spacing);
+    const spacing = 1.4 * Math.max(data.clouds.source.spacing, data.clouds.target.spacing);
     drawn.pseudo = added(data.pseudo, data.pseudo.of, spacing);
     drawn.pseudo.uniforms.colouring = { value: 0 };
     drawn.pseudo.object.visible = false;
