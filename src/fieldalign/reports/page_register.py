@@ -48,12 +48,12 @@ def write_report(
     path = checked_page_path(path)
     pair = prepare_pair(source, target, resolve_threads(None), True, len(result.information) in _SCALED)
     scene = scene_of(result, *pair)
-    others = result.alternatives[:_OTHERS]
     name = title or "Source onto target"
-    return write_page(Page(name, _body(name, result, scene, others), _SCRIPTS, viewer_data(scene, others)), path)
+    data = {"scenes": [viewer_data(scene, result.alternatives[:_OTHERS])]}
+    return write_page(Page(name, _body(name, result, scene), _SCRIPTS, data), path)
 
 
-def _body(title: str, result: RegistrationResult, scene: Scene, others: tuple[RegistrationResult, ...]) -> str:
+def _body(title: str, result: RegistrationResult, scene: Scene) -> str:
     mark, word = ("good", "Accepted") if result.accepted else ("bad", "Not accepted")
     why = str(result.reason).split(": ", 1)[-1]
     return f"""<a class="skip" href="#verdict">Skip to the verdict</a>
@@ -68,7 +68,7 @@ def _body(title: str, result: RegistrationResult, scene: Scene, others: tuple[Re
 <p>{escape(_evidence_sentence(result))}</p>
 {_facts(result, scene)}
 </section>
-{_viewer(scene, len(others))}
+{part('viewer.html')}
 <section class="columns">
 {evidence_table(result)}
 {certainty_table(result)}
@@ -110,32 +110,6 @@ def _facts(result: RegistrationResult, scene: Scene) -> str:
 def _turn(T: Floats) -> float:
     """By how many degrees a similarity (4, 4) turns."""
     return float(np.degrees(angles_between(T @ growth(1 / size_of(T)), np.eye(4))))
-
-
-def _viewer(scene: Scene, others: int) -> str:
-    """The instrument: page/viewer.html with what is not always there left out or filled in."""
-    counts = [len(places) for places in scene.places]
-    poses = ""
-    if others:
-        options = "".join(f'<option value="{k}">alternative {k}</option>' for k in range(1, others + 1))
-        options = f'<option value="0">the result</option>{options}'
-        poses = f'<label class="pose">Pose <select id="pose">{options}</select></label>'
-    story = (
-        f"Two point clouds in 3D: {counts[0]} points of the source and {counts[1]} of the target, the source where it "
-        "came from and where the result takes it. The verdict, the table of evidence and the charts say the same in "
-        "words and numbers."
-    )
-    near = scene.near[0]
-    fills = {
-        "STORY": escape(story), "POSES": poses, "SIDE": escape(near.side), "LIMIT": f"{scene.limit:.2g}",
-        "LOW": f"−{scene.limit:.2g}" if near.signed else "0", "SIDED": "" if near.signed else "one-sided",
-        "VOXEL": f"{scene.voxel:.2g}",
-        "SOURCE_COUNT": f"{counts[0]:,}", "TARGET_COUNT": f"{counts[1]:,}",
-    }
-    text = part("viewer.html")
-    for key, value in fills.items():
-        text = text.replace(f"[[{key}]]", value)
-    return text
 
 
 def _residuals(scene: Scene) -> str:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..assembly.pair_result import PairResult
 from ..fields import PointField
 from ..fields.protocol import Floats
 from ..methods.pair import Pair
@@ -46,14 +47,16 @@ class Scene:
     pseudo_of: str
 
 
-def scene_of(result: RegistrationResult, source: PreparedCloud, target: PreparedCloud) -> Scene:
-    """The scene of a result; what the registration made of the clouds is used again."""
+def scene_of(
+    result: RegistrationResult | PairResult, source: PreparedCloud, target: PreparedCloud, most: int = MOST_POINTS
+) -> Scene:
+    """The scene of a result, of each cloud so many points; what the registration made of the clouds is used again."""
     T = in_space(result.T_target_source)
     size = size_of(T)
     as_large = source if np.isclose(size, 1, rtol=1e-12, atol=0) else ScaledCloud(source, size)
     rigid = T @ growth(1 / size)
     voxel = common_voxel(as_large.scale, target.scale)
-    places = _drawn(source), _drawn(target)
+    places = _drawn(source, most), _drawn(target, most)
     near = (
         closeness(size * places[0], as_large, target, rigid, voxel),
         closeness(places[1], target, as_large, inverse(rigid), voxel),
@@ -64,7 +67,7 @@ def scene_of(result: RegistrationResult, source: PreparedCloud, target: Prepared
     return Scene(source, target, places, near, T, limit, voxel, pseudo, of)
 
 
-def viewer_data(scene: Scene, others: tuple[RegistrationResult, ...]) -> dict[str, Any]:
+def viewer_data(scene: Scene, others: tuple[RegistrationResult, ...] = ()) -> dict[str, Any]:
     """The scene in numbers and base64, about the middle of the target; others: poses that may be looked at, too."""
     middles = np.median(scene.places[0], axis=0), np.median(scene.places[1], axis=0)
     origin = middles[1]
@@ -87,19 +90,32 @@ def viewer_data(scene: Scene, others: tuple[RegistrationResult, ...]) -> dict[st
         "oblique": views.obliquely(up, ahead)[2].tolist(),
         "side": (-ahead).tolist(),
         "ceiling": ceiling if np.isfinite(ceiling) else None,
-        "limit": scene.limit,
+        "signed": scene.near[0].signed,
+        "words": _words(scene),
     }
 
 
-def _drawn(cloud: PreparedCloud) -> Floats:
+def _words(scene: Scene) -> dict[str, str]:
+    """What the page says of the scene."""
+    source, target = (f"{len(places):,}" for places in scene.places)
+    near = scene.near[0]
+    return {
+        "source": source, "target": target, "voxel": f"{scene.voxel:.2g}", "limit": f"{scene.limit:.2g}",
+        "low": f"−{scene.limit:.2g}" if near.signed else "0", "side": near.side,
+        "story": f"Two point clouds in 3D: {source} points of the source and {target} of the target, the source where "
+        "it came from and where the result takes it. The verdict, the tables and the charts say the same in words.",
+    }
+
+
+def _drawn(cloud: PreparedCloud, most: int) -> Floats:
     """Some points of a cloud, the same ones each time, or places on a surface."""
     points = cloud.field.points if isinstance(cloud.field, PointField) else cloud.fine.points
-    if len(points) > MOST_POINTS:
-        points = points[np.sort(np.random.default_rng(0).choice(len(points), MOST_POINTS, replace=False))]
+    if len(points) > most:
+        points = points[np.sort(np.random.default_rng(0).choice(len(points), most, replace=False))]
     return np.ascontiguousarray(points, float)
 
 
-def _pseudo_points(result: RegistrationResult, pair: Pair, size: float) -> tuple[Floats | None, str]:
+def _pseudo_points(result: RegistrationResult | PairResult, pair: Pair, size: float) -> tuple[Floats | None, str]:
     """The third set, in the frame of the cloud that it was drawn on, and which one that is."""
     if result.evidence is None:  # the paper's method
         return pair.target.last_pseudo_points, "target"

@@ -1,8 +1,9 @@
-// The two clouds in 3D. The source moves along the screw motion from where it came from to where the result takes it.
+// Two clouds in 3D. The source moves along the screw motion from where it came from to where the result takes it.
+// A page may hold many scenes, each a pair; the event "choose" shows another one.
 "use strict";
 (() => {
   const $ = (id) => document.getElementById(id);
-  const data = JSON.parse($("data").textContent);
+  const { scenes } = JSON.parse($("data").textContent);
   const canvas = $("canvas");
   const calm = matchMedia("(prefers-reduced-motion: reduce)").matches;
   const PLAYED = 1600; // milliseconds from before to after
@@ -16,8 +17,7 @@
   try {
     renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true, preserveDrawingBuffer: true });
   } catch {
-    canvas.hidden = true;
-    $("no-view").hidden = false;
+    $("viewer").classList.add("off");
     return;
   }
 
@@ -56,7 +56,7 @@
 
   const shared = {
     colouring: { value: 0 }, scale: { value: 1 }, ceiling: { value: Infinity },
-    up: { value: new THREE.Vector3(...data.up) },
+    up: { value: new THREE.Vector3() },
     alone: { value: new THREE.Color() }, contradicts: { value: new THREE.Color() }, agrees: { value: new THREE.Color() },
     inside: { value: new THREE.Color() }, on: { value: new THREE.Color() }, outside: { value: new THREE.Color() },
   };
@@ -87,16 +87,54 @@
     return { object, uniforms, of, spacing, local: places(packed) };
   };
 
-  const drawn = {
-    source: added(data.clouds.source, "source", data.clouds.source.spacing),
-    target: added(data.clouds.target, "target", data.clouds.target.spacing),
+  let data = null; // of the scene that is shown
+  let drawn = {};
+  let witnesses = {}; // some places of each cloud, which stand for all where the camera is set up
+
+  const load = (number) => {
+    for (const { object } of Object.values(drawn)) {
+      scene.remove(object);
+      object.geometry.dispose();
+      object.material.dispose();
+    }
+    data = scenes[number];
+    const { source, target } = data.clouds;
+    drawn = { source: added(source, "source", source.spacing), target: added(target, "target", target.spacing) };
+    if (data.pseudo) {
+      drawn.pseudo = added(data.pseudo, data.pseudo.of, 1.4 * Math.max(source.spacing, target.spacing));
+      drawn.pseudo.uniforms.colouring = { value: 0 };
+    }
+    for (const name in drawn) drawn[name].object.visible = $(`show-${name}`).checked;
+    witnesses = { source: some(drawn.source), target: some(drawn.target) };
+    describe();
+    aim();
+    pose = 0;
+    place(1);
+    hideCeiling(!$("show-ceiling").checked);
+    recolour();
   };
-  if (data.pseudo) {
-    const spacing = 1.4 * Math.max(data.clouds.source.spacing, data.clouds.target.spacing);
-    drawn.pseudo = added(data.pseudo, data.pseudo.of, spacing);
-    drawn.pseudo.uniforms.colouring = { value: 0 };
-    drawn.pseudo.object.visible = false;
-  }
+
+  const some = ({ object }) => {
+    const { position } = object.geometry.attributes;
+    const step = Math.max(1, Math.floor(position.count / WITNESSES));
+    const found = [];
+    for (let k = 0; k < position.count; k += step) found.push(new THREE.Vector3().fromBufferAttribute(position, k));
+    return found;
+  };
+
+  // What the page says of the scene, and the controls that only some scenes have.
+  const describe = () => {
+    for (const [name, word] of Object.entries(data.words)) {
+      for (const element of document.querySelectorAll(`[data-word=${name}]`)) element.textContent = word;
+    }
+    canvas.setAttribute("aria-label", data.words.story);
+    document.querySelector("[data-legend=distance]").classList.toggle("one-sided", !data.signed);
+    $("pseudo-label").hidden = !data.pseudo;
+    $("pseudo-legend").hidden = !data.pseudo || !$("show-pseudo").checked;
+    $("ceiling-label").hidden = data.ceiling === null;
+    $("pose-label").hidden = data.motions.length === 1;
+    $("pose").replaceChildren(...data.motions.map((_, k) => new Option(k ? `alternative ${k}` : "the result", k)));
+  };
 
   // Colours stand once, in the style of the page; the legend's swatches tell them.
   const recolour = () => {
@@ -163,33 +201,32 @@
   // ---- The camera
 
   const camera = new THREE.PerspectiveCamera(FIELD, 1, 0.1, 10);
-  camera.up.set(...data.up);
-  const controls = new THREE.OrbitControls(camera, canvas);
-  controls.zoomToCursor = true;
+  const up = new THREE.Vector3();
+  let controls = null;
+  let views = {};
+  let gaze = null; // from what is looked at to the camera
   let radius = 1; // about how far all reaches, where the camera was set up last
   let framed = true; // the camera follows until somebody takes hold of it
-  controls.addEventListener("start", () => (framed = false));
-  controls.addEventListener("change", () => draw());
 
-  const up = new THREE.Vector3(...data.up);
-  const side = new THREE.Vector3(...data.side);
-  const VIEWS = {
-    oblique: new THREE.Vector3(...data.oblique),
-    above: up.clone().addScaledVector(side, 1e-3),
-    side: side.clone().addScaledVector(up, 0.12),
+  // Looks at the scene obliquely, its own vertical upwards.
+  const aim = () => {
+    up.set(...data.up);
+    shared.up.value.copy(up);
+    const side = new THREE.Vector3(...data.side);
+    views = {
+      oblique: new THREE.Vector3(...data.oblique),
+      above: up.clone().addScaledVector(side, 1e-3),
+      side: side.addScaledVector(up, 0.12),
+    };
+    gaze = views.oblique.clone().normalize();
+    framed = true;
+    controls?.dispose();
+    camera.up.copy(up);
+    controls = new THREE.OrbitControls(camera, canvas); // they keep the vertical that they are made with
+    controls.zoomToCursor = true;
+    controls.addEventListener("start", () => (framed = false));
+    controls.addEventListener("change", () => draw());
   };
-  let gaze = VIEWS.oblique.clone().normalize();
-
-  // Some places of each cloud, which stand for all where the camera is set up.
-  const witnesses = Object.fromEntries(["source", "target"].map((name) => {
-    const { geometry } = drawn[name].object;
-    const { count } = geometry.attributes.position;
-    const some = [];
-    for (let k = 0; k < count; k += Math.max(1, Math.floor(count / WITNESSES))) {
-      some.push(new THREE.Vector3().fromBufferAttribute(geometry.attributes.position, k));
-    }
-    return [name, some];
-  }));
 
   // All that is shown at the present share of the motion, as seen along the gaze: right, up and towards the viewer.
   const seen = () => {
@@ -238,7 +275,7 @@
   const look = (name) => {
     gaze = name === "fit"
       ? camera.position.clone().sub(controls.target).normalize()
-      : VIEWS[name].clone().normalize();
+      : views[name].clone().normalize();
     framed = true;
     frame();
     draw();
@@ -328,22 +365,18 @@
   for (const radio of document.querySelectorAll("[name=colour]")) {
     radio.addEventListener("change", () => colour(radio.value));
   }
-  for (const name in drawn) {
+  for (const name of ["source", "target", "pseudo"]) {
     $(`show-${name}`).addEventListener("change", (event) => show(name, event.target.checked));
   }
-  $("pseudo-label").hidden = !data.pseudo;
-  $("ceiling-label").hidden = data.ceiling === null;
   $("show-ceiling").addEventListener("change", (event) => hideCeiling(!event.target.checked));
   for (const button of document.querySelectorAll("[data-view]")) {
     button.addEventListener("click", () => look(button.dataset.view));
   }
-  if ($("pose")) {
-    $("pose").addEventListener("change", (event) => {
-      pose = Number(event.target.value);
-      if (pose) colour("cloud"); // the other colours are those of the result
-      stop(1);
-    });
-  }
+  $("pose").addEventListener("change", (event) => {
+    pose = Number(event.target.value);
+    if (pose) colour("cloud"); // the other colours are those of the result
+    stop(1);
+  });
 
   const nextColouring = () => colour(COLOURINGS[(shared.colouring.value + 1) % COLOURINGS.length]);
   const toggle = (name) => drawn[name] && show(name, !drawn[name].object.visible);
@@ -372,9 +405,11 @@
   });
 
   addEventListener("recolour", recolour);
+  addEventListener("choose", (event) => {
+    cancelAnimationFrame(playing);
+    load(event.detail);
+  });
   new ResizeObserver(resize).observe(canvas);
-  place(1);
-  hideCeiling(true);
+  load(0);
   resize();
-  recolour();
 })();
