@@ -121,3 +121,10 @@ def test_an_error_of_the_user_is_one_line(call, options, words):
     status, out, err = call("batch", *options)
     assert (status, out, len(err.splitlines())) == (1, "", 1)
     assert words in err
+
+
+def test_a_report_holds_all_pairs(call, scans):
+    folder, _ = scans
+    status, _, _ = call("batch", "lists/mixed.csv", "--report", "report.html")
+    assert status == 3
+    assert (folder / "report.html").read_text("utf-8").count("<tr data-pair") == 4

@@ -332,6 +332,23 @@ COUNT = """(() => {
 
 
 @pytest.fixture
+def blind(chromium):
+    """A browser without WebGL."""
+    script = "HTMLCanvasElement.prototype.getContext = () => null"
+    made = chromium.call("Page.addScriptToEvaluateOnNewDocument", source=script)
+    yield chromium
+    chromium.call("Page.removeScriptToEvaluateOnNewDocument", **made)
+
+
+def test_without_webgl_all_else_stands(blind, report):
+    blind.open(report)
+    assert blind.run("getComputedStyle(document.getElementById('no-view')).display") == "block"
+    assert blind.run("getComputedStyle(document.querySelector('.sliding')).display") == "none"
+    blind.click("#tab2")
+    assert not blind.run("document.getElementById('form2').hidden")
+
+
+@pytest.fixture
 def browser(chromium, report):
     """The report, open; it complained of nothing when the test ends."""
     chromium.open(report)

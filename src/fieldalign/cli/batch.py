@@ -6,7 +6,7 @@ import csv
 import io
 import json
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,7 +17,7 @@ import fieldalign as fa
 from ..errors import ArgumentError
 from ..motions import Matrix
 from .executors import bar, chosen_executor, executor_options
-from .files import check_folder, write_text
+from .files import check_folder, check_report, write_text
 from .poses import read_pose
 
 _SHOWN = 10  # failures that are told
@@ -37,11 +37,14 @@ class Row(NamedTuple):
 @click.argument("pairs", type=click.Path(exists=True, dir_okay=False), metavar="PAIRS.CSV")
 @click.option("--output", type=click.Path(dir_okay=False), help="Write the results as CSV to this file.")
 @click.option("--json", "json_path", type=click.Path(allow_dash=True), help="Write the results as JSON; - for stdout.")
+@click.option("--report", type=click.Path(dir_okay=False),
+              help="Write a page: a table that sorts, failures first, each pair in 3D a click away (.html).")
 @executor_options
 def command(
     pairs: str,
     output: str | None,
     json_path: str | None,
+    report: str | None,
     run_folder: str | None,
     workers: int | None,
     dask: str | None,
@@ -56,6 +59,7 @@ def command(
     """
     rows = read_rows(Path(pairs))
     check_folder(output, json_path)
+    check_report(report)
     folder = Path(pairs).parent
     given = [(str(folder / row.source), str(folder / row.target), row.init) for row in rows]
     with bar() as tell:
@@ -63,6 +67,8 @@ def command(
             given, executor=chosen_executor(workers, dask), run_folder=run_folder, seed=seed,
             progress=lambda finished, of: tell("registering", finished, of),
         )
+        if report is not None:
+            _write_report(results, given, report, f"{Path(pairs).name}: {len(results)} pairs", tell)
     plain = json.dumps([result.to_dict() for result in results], indent=1)
     write_text(output, _csv(rows, results))
     write_text(json_path, plain)
@@ -71,6 +77,15 @@ def command(
     else:
         _print(results)
     return 0 if all(result.accepted for result in results) else 3
+
+
+def _write_report(
+    results: Sequence[fa.PairResult], pairs: Sequence[Sequence[Any]], path: str, title: str,
+    tell: Callable[[str, int, int | None], None],
+) -> None:
+    from ..reports.page_batch import write_batch_report
+
+    write_batch_report(results, pairs, path, title, lambda finished, of: tell("drawing", finished, of))
 
 
 def read_rows(path: Path) -> list[Row]:

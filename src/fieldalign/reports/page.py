@@ -85,6 +85,22 @@ def rendered(page: Page) -> str:
 """
 
 
+def head(title: str, kind: str, first: str) -> str:
+    """What stands above the contents. first: the element to which the keyboard may skip."""
+    return f"""<a class="skip" href="#{first}">Skip to the results</a>
+<header>
+<p class="kicker">fieldalign <span>{kind}</span>
+<button id="theme" type="button" aria-label="Change between light and dark">◐</button></p>
+<h1>{escape(title)}</h1>
+</header>"""
+
+
+def foot() -> str:
+    """What stands below."""
+    return f"""<footer><p>Made by fieldalign {__version__}. What the verdict means: docs/verdict.md. The view is
+drawn by three.js (MIT licence, in this file). This page is complete: it asks nothing of a network.</p></footer>"""
+
+
 def part(name: str) -> str:
     """The text of a file of the folder page/."""
     return files(__package__).joinpath("page", name).read_text(encoding="utf-8")

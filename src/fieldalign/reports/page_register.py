@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import __version__
 from ..fields.protocol import Floats
 from ..motions import angles_between, apply, growth, reach_of, size_of
 from ..prepare import CloudLike, prepare_pair
@@ -16,7 +15,7 @@ from ..result import RegistrationResult
 from ..threads import resolve_threads
 from .charts import curve, histogram, share_bar
 from .evidence_table import certainty_table, evidence_table
-from .page import Page, checked_page_path, part, write_page
+from .page import Page, checked_page_path, foot, head, part, write_page
 from .pose_forms import in_space, pose_forms
 from .scene import Scene, scene_of, viewer_data
 
@@ -56,12 +55,7 @@ def write_report(
 def _body(title: str, result: RegistrationResult, scene: Scene) -> str:
     mark, word = ("good", "Accepted") if result.accepted else ("bad", "Not accepted")
     why = str(result.reason).split(": ", 1)[-1]
-    return f"""<a class="skip" href="#verdict">Skip to the verdict</a>
-<header>
-<p class="kicker">fieldalign <span>registration report</span>
-<button id="theme" type="button" aria-label="Change between light and dark">◐</button></p>
-<h1>{escape(title)}</h1>
-</header>
+    return f"""{head(title, "registration report", "verdict")}
 <main>
 <section id="verdict" class="verdict {mark}" aria-labelledby="said">
 <h2 id="said"><span class="mark">{word}</span> {escape(why[:1].upper() + why[1:])}</h2>
@@ -80,8 +74,7 @@ def _body(title: str, result: RegistrationResult, scene: Scene) -> str:
 </section>
 {_poses(result)}
 </main>
-<footer><p>Made by fieldalign {escape(__version__)}. What the verdict means: docs/verdict.md. The view is drawn by
-three.js (MIT licence, in this file). This page is complete: it asks nothing of a network.</p></footer>"""
+{foot()}"""
 
 
 def _evidence_sentence(result: RegistrationResult) -> str:

@@ -48,7 +48,8 @@ class Scene:
 
 
 def scene_of(
-    result: RegistrationResult | PairResult, source: PreparedCloud, target: PreparedCloud, most: int = MOST_POINTS
+    result: RegistrationResult | PairResult, source: PreparedCloud, target: PreparedCloud, most: int = MOST_POINTS,
+    with_pseudo: bool = True,
 ) -> Scene:
     """The scene of a result, of each cloud so many points; what the registration made of the clouds is used again."""
     T = in_space(result.T_target_source)
@@ -63,7 +64,7 @@ def scene_of(
     )
     met = np.abs(np.concatenate([one.distance[one.meets] for one in near]))
     limit = max(float(np.percentile(met, _FULL)), 1e-12 * target.extent) if len(met) else voxel
-    pseudo, of = _pseudo_points(result, Pair(as_large, target, voxel), size)
+    pseudo, of = _pseudo_points(result, Pair(as_large, target, voxel), size) if with_pseudo else (None, "target")
     return Scene(source, target, places, near, T, limit, voxel, pseudo, of)
 
 

@@ -1,0 +1,52 @@
+// A table that sorts by its columns, and shows the pair of a row: its picture, its verdict, its pose.
+"use strict";
+(() => {
+  const $ = (id) => document.getElementById(id);
+  const { pairs } = JSON.parse($("data").textContent);
+  const body = $("pairs").tBodies[0];
+  const calm = matchMedia("(prefers-reduced-motion: reduce)").matches;
+
+  const choose = (number) => {
+    const pair = pairs[number];
+    for (const row of body.rows) row.classList.toggle("chosen", Number(row.dataset.pair) === number);
+    for (const button of body.querySelectorAll("button")) {
+      button.setAttribute("aria-pressed", String(Number(button.closest("tr").dataset.pair) === number));
+    }
+    $("chosen").textContent = pair.name;
+    $("said").textContent = pair.verdict;
+    $("form0").hidden = !pair.pose;
+    $("form0").querySelector("pre").textContent = pair.pose;
+    if ($("viewer")) {
+      $("viewer").hidden = pair.scene === null;
+      if (pair.scene !== null) dispatchEvent(new CustomEvent("choose", { detail: pair.scene }));
+    }
+  };
+
+  const sort = (header) => {
+    const column = [...header.parentElement.cells].indexOf(header);
+    const way = header.getAttribute("aria-sort") === "ascending" ? -1 : 1;
+    for (const other of header.parentElement.cells) other.removeAttribute("aria-sort");
+    header.setAttribute("aria-sort", way === 1 ? "ascending" : "descending");
+    const value = (row) => row.cells[column].dataset.value;
+    const isNumber = header.classList.contains("number");
+    // What has no number comes last, either way.
+    const compare = (a, b) => (isNumber
+      ? (value(a) === "") - (value(b) === "") || way * (value(a) - value(b))
+      : way * value(a).localeCompare(value(b), undefined, { numeric: true }));
+    body.append(...[...body.rows].sort(compare));
+  };
+
+  $("pairs").tHead.addEventListener("click", (event) => {
+    const header = event.target.closest("th");
+    if (header) sort(header);
+  });
+  body.addEventListener("click", (event) => {
+    const row = event.target.closest("tr");
+    if (!row) return;
+    choose(Number(row.dataset.pair));
+    if ($("shown").getBoundingClientRect().top < 0) {
+      $("shown").scrollIntoView({ behavior: calm ? "auto" : "smooth", block: "start" });
+    }
+  });
+  choose(Math.max(0, pairs.findIndex((pair) => pair.scene !== null)));
+})();
