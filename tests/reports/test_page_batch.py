@@ -10,7 +10,7 @@ import pytest
 
 import fieldalign as fa
 from fieldalign.motions import apply, exp_twist
-from fieldalign.reports import page_batch, write_batch_report
+from fieldalign.reports import pair_table, write_batch_report
 
 T = exp_twist(np.array([0.5, -1, 0.7, 0.3, 0.2, -0.4]))
 
@@ -58,7 +58,7 @@ def test_the_page_is_the_same_again_and_holds_no_element_from_outside(report, re
 
 
 def test_only_the_weakest_of_many_have_pictures(monkeypatch, results, pairs, tmp_path):
-    monkeypatch.setattr(page_batch, "_PICTURES", 2)
+    monkeypatch.setattr(pair_table, "_PICTURES", 2)
     asked = []
     path = write_batch_report(results, pairs, tmp_path / "few.html", progress=lambda done, of: asked.append((done, of)))
     assert [pair["scene"] for pair in data_of(path)["pairs"]] == [None, 0, None]

@@ -95,6 +95,12 @@ def head(title: str, kind: str, first: str) -> str:
 </header>"""
 
 
+def facts(values: Mapping[str, str]) -> str:
+    """What one asks first, in large figures: name and value, both plain text."""
+    cells = "".join(f"<div><dt>{escape(name)}</dt><dd>{escape(value)}</dd></div>" for name, value in values.items())
+    return f'<dl class="facts">{cells}</dl>'
+
+
 def foot() -> str:
     """What stands below."""
     return f"""<footer><p>Made by fieldalign {__version__}. What the verdict means: docs/verdict.md. The view is

@@ -15,7 +15,7 @@ from ..result import RegistrationResult
 from ..threads import resolve_threads
 from .charts import curve, histogram, share_bar
 from .evidence_table import certainty_table, evidence_table
-from .page import Page, checked_page_path, foot, head, part, write_page
+from .page import Page, checked_page_path, facts, foot, head, part, write_page
 from .pose_forms import in_space, pose_forms
 from .scene import Scene, scene_of, viewer_data
 
@@ -87,7 +87,7 @@ def _facts(result: RegistrationResult, scene: Scene) -> str:
     """What one asks first, in large numbers."""
     middle = np.median(scene.places[0], axis=0)
     shift = float(np.linalg.norm(apply(scene.T, middle[None])[0] - middle))
-    facts = {
+    return facts({
         "turned by": f"{_turn(scene.T):.1f}°",
         "moved by": f"{shift:.3g}",
         **({"grown by": f"{size_of(scene.T):.4g}×"} if len(result.information) in _SCALED else {}),
@@ -95,9 +95,7 @@ def _facts(result: RegistrationResult, scene: Scene) -> str:
         "overlap of the target": f"{result.overlap_target:.0%}",
         "residual, rms": f"{result.rmse:.2g}",
         "time": f"{sum(result.seconds.values()) * 1e3:.0f} ms",
-    }
-    cells = "".join(f"<div><dt>{name}</dt><dd>{escape(value)}</dd></div>" for name, value in facts.items())
-    return f'<dl class="facts">{cells}</dl>'
+    })
 
 
 def _turn(T: Floats) -> float:
