@@ -194,3 +194,12 @@ def test_json_on_stdout_is_all_there_is(call):
     status, out, err = call("assemble", *NAMES, "--json", "-")
     assert (status, err) == (0, "")
     assert json.loads(out)["components"] == [[0, 1, 2]]
+
+
+def test_a_report_shows_the_graph(call, scans):
+    folder, _ = scans
+    status, _, _ = call("assemble", *NAMES, "broken.ply", "--report", "report.html")
+    assert status == 3
+    text = (folder / "report.html").read_text("utf-8")
+    assert text.count('class="node"') == 3
+    assert "<b>broken.ply</b>: " in text

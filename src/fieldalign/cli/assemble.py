@@ -17,7 +17,7 @@ from ..clouds.files import writer_of
 from ..errors import ArgumentError
 from ..motions import as_rigid
 from .executors import bar, chosen_executor, executor_options
-from .files import check_folder, write_text
+from .files import check_folder, check_report, write_text
 
 
 @click.command("assemble")
@@ -26,6 +26,8 @@ from .files import check_folder, write_text
 @click.option("--poses-to", type=click.Path(), help="Write {scan: world_from_scan} as JSON.")
 @click.option("--json", "json_path", type=click.Path(allow_dash=True),
               help="Write everything that was found as JSON; - for stdout.")
+@click.option("--report", type=click.Path(dir_okay=False),
+              help="Write a page: the graph of scans, the pairs that fit worst in 3D, what was left out (.html).")
 @click.option("--moved", type=click.Path(), help="Write every placed scan, whole and moved, into this folder.")
 @click.option("--poses", type=click.Path(), help="Poses that are known: JSON {scan: 4 x 4}, as --poses-to writes them.")
 @click.option("--sigma", type=(float, float), metavar="DEGREES LENGTH", help="How well --poses are known.")
@@ -39,6 +41,7 @@ def command(
     output: str | None,
     poses_to: str | None,
     json_path: str | None,
+    report: str | None,
     moved: str | None,
     poses: str | None,
     sigma: tuple[float, float] | None,
@@ -58,6 +61,7 @@ def command(
     if output is not None:
         writer_of(output)
     check_folder(output, poses_to, json_path)
+    check_report(report)
     places = None if moved is None else _places(Path(moved), scans)
     known = None if poses is None else _read_poses(poses, scans)
     with bar() as progress:
@@ -66,6 +70,12 @@ def command(
             sensor_at_origin=sensor_at_origin, dof=dof, executor=chosen_executor(workers, dask), run_folder=run_folder,
             progress=progress, seed=seed,
         )
+        if report is not None:
+            from ..reports import write_assembly_report
+
+            write_assembly_report(
+                found, scans, report, progress=lambda finished, of: progress("drawing", finished, of)
+            )
     placed = {scan: None if T is None else T.tolist() for scan, T in zip(scans, found.poses, strict=True)}
     write_text(poses_to, json.dumps(placed, indent=1))
     everything = json.dumps({"scans": list(scans)} | found.to_dict(), indent=1)

@@ -56,6 +56,11 @@ def check_picture(path: str | None) -> None:
         checked_path(path)
 
 
+def is_page_path(path: str) -> bool:
+    """Whether a path asks for a page, not for a picture."""
+    return Path(path).suffix.lower() in (".html", ".htm")
+
+
 def check_report(path: str | None) -> None:
     """Raises where a page cannot be written to a path."""
     if path is not None:

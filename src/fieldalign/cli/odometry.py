@@ -15,7 +15,7 @@ from ..errors import MissingExtraError
 from ..odometry import drive as drives
 from ..odometry.sequences.sweeps import SWEEPS
 from .executors import bar
-from .files import check_picture
+from .files import check_picture, check_report, is_page_path
 
 _SHOWN = 8  # frames that are told by their numbers
 
@@ -31,7 +31,8 @@ _SHOWN = 8  # frames that are told by their numbers
 @click.option("--loops", is_flag=True, help="At the end, close the loops of a drive that comes back.")
 @click.option("--truth", type=click.Path(), help="A trajectory (TUM, KITTI) of the same sensor to measure against.")
 @click.option("--report", type=click.Path(),
-              help="Draw the trajectory here (.png, .svg, .pdf).  [default: FOLDER/trajectory.png]")
+              help="Draw the trajectory here (.png, .svg, .pdf), or write a page with it, the map, the errors and the "
+              "frames that were not tracked (.html).  [default: FOLDER/trajectory.png]")
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of every random draw.")
 def command(
     sequence: str,
@@ -53,7 +54,8 @@ def command(
 
     Exit status 0: every frame was tracked; 3: some were not.
     """
-    check_picture(report)
+    is_page = report is not None and is_page_path(report)
+    (check_report if is_page else check_picture)(report)
     truly = None if truth is None else fa.read_trajectory(truth)
     frames = fa.read_sequence(sequence, topic=topic, sweep=sweep)
     odometry = fa.Odometry(deskew=not no_deskew, whole=True)
@@ -70,6 +72,9 @@ def command(
     if evaluation is not None:
         drives.add_to_summary(output, evaluation=evaluation.to_dict())
     _tell(drive, closed, evaluation)
+    if is_page:
+        _write_page(str(report), drive, trajectory, odometry.map if closed is None else closed.map, evaluation)
+        report = None
     _draw(Path(output, "trajectory.png") if report is None else Path(report), trajectory, evaluation, report is None)
     return 0 if drive.tracked else 3
 
@@ -110,6 +115,16 @@ def _numbers(frames: Sequence[int]) -> str:
     """How many, and which, the first of them."""
     shown = ", ".join(map(str, frames[:_SHOWN])) + (", ..." if len(frames) > _SHOWN else "")
     return f"{len(frames)} frame{'s' if len(frames) > 1 else ''} ({shown})"
+
+
+def _write_page(
+    path: str, drive: drives.Drive, trajectory: fa.Trajectory, world: fa.PointCloud, evaluation: fa.Evaluation | None
+) -> None:
+    from ..reports import write_odometry_report
+
+    reasons = [row.reason for row in drive.rows]
+    title = f"{drive.sequence.name}: {len(reasons)} frames"
+    write_odometry_report(trajectory, path, reasons=reasons, world=world, evaluation=evaluation, title=title)
 
 
 def _draw(path: Path, trajectory: fa.Trajectory, evaluation: fa.Evaluation | None, is_optional: bool) -> None:

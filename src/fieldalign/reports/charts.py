@@ -62,6 +62,23 @@ def histogram(values: Floats, limit: float, signed: bool, label: str, bars: int 
     return _svg(story, f"{marks}{''.join(drawn)}{ends}{_axis(label)}")
 
 
+def profile(along: Floats, values: Floats, spans: Sequence[tuple[float, float]], label: str, across: str) -> str:
+    """Values (n,) over places along a way (n,); spans: parts of the way to shade."""
+    end = float(along[-1]) or 1.0
+    low, high = min(0.0, float(values.min())), max(0.0, float(values.max()))
+    high = max(high, low + max(1e-9 * abs(low), 1e-12))
+    shades = "".join(
+        f'<rect class="span" x="{a:.1f}" y="{_TOP}" width="{max(b - a, 1.5):.1f}" height="{_HIGH - _BOTTOM - _TOP}"/>'
+        for a, b in (_along(np.array(span), 0, end) for span in spans)
+    )
+    marks = "".join(_grid_line(float(_up(v, low, high)), f"{v:.3g}") for v in (low, (low + high) / 2, high))
+    points = zip(_along(along, 0, end), _up(values, low, high), strict=True)
+    path = "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in points)
+    ends = _label(_LEFT, "0") + _label(_WIDE - _RIGHT, f"{end:.4g}", "end")
+    story = f"{label} over {end:.4g} of {across}, from {values.min():.3g} to {values.max():.3g}"
+    return _svg(story, f'{shades}{marks}<path class="curve" d="{path}"/>{ends}{_axis(across)}')
+
+
 def lever(factor: float) -> str:
     """A factor on a logarithmic scale from a tenth to ten, with 1, which is asked for, in the middle."""
     at = _LEVER / 2 * (1 + float(np.clip(np.log10(max(factor, 1e-9)), -1, 1)))

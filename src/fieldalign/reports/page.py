@@ -101,10 +101,11 @@ def facts(values: Mapping[str, str]) -> str:
     return f'<dl class="facts">{cells}</dl>'
 
 
-def foot() -> str:
+def foot(in_3d: bool = True) -> str:
     """What stands below."""
-    return f"""<footer><p>Made by fieldalign {__version__}. What the verdict means: docs/verdict.md. The view is
-drawn by three.js (MIT licence, in this file). This page is complete: it asks nothing of a network.</p></footer>"""
+    drawn = "Views in 3D are drawn by three.js (MIT licence, in this file). " if in_3d else ""
+    return f"""<footer><p>Made by fieldalign {__version__}. What the verdict means: docs/verdict.md. {drawn}This
+page is complete: it asks nothing of a network.</p></footer>"""
 
 
 def part(name: str) -> str:

@@ -8,7 +8,9 @@
 
   const choose = (number) => {
     const pair = pairs[number];
-    for (const row of body.rows) row.classList.toggle("chosen", Number(row.dataset.pair) === number);
+    for (const marked of document.querySelectorAll("main [data-pair]")) {
+      marked.classList.toggle("chosen", Number(marked.dataset.pair) === number);
+    }
     for (const button of body.querySelectorAll("button")) {
       button.setAttribute("aria-pressed", String(Number(button.closest("tr").dataset.pair) === number));
     }
@@ -40,11 +42,13 @@
     const header = event.target.closest("th");
     if (header) sort(header);
   });
-  body.addEventListener("click", (event) => {
-    const row = event.target.closest("tr");
-    if (!row) return;
-    choose(Number(row.dataset.pair));
-    if ($("shown").getBoundingClientRect().top < 0) {
+  // Rows of the table, and lines of a graph.
+  document.querySelector("main").addEventListener("click", (event) => {
+    const marked = event.target.closest("[data-pair]");
+    if (!marked) return;
+    choose(Number(marked.dataset.pair));
+    const { top, bottom } = $("shown").getBoundingClientRect();
+    if (top < 0 || bottom > innerHeight + 200 || top > innerHeight / 2) {
       $("shown").scrollIntoView({ behavior: calm ? "auto" : "smooth", block: "start" });
     }
   });
