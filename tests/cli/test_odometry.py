@@ -103,3 +103,13 @@ def test_a_bar_of_unknown_length():
     with bar() as tell:
         tell("frames", 0, None)
         tell("frames", 3, None)
+
+
+def test_a_report_that_is_a_page_comes_beside_the_picture(call, tmp_path):
+    arguments = "--output", tmp_path / "out", "--truth", "truth.txt", "--report", tmp_path / "drive.html"
+    status, _, _ = call("odometry", "broken", *arguments)
+    assert status == 3
+    text = (tmp_path / "drive.html").read_text("utf-8")
+    assert "<th scope=row>frame 6</th>" in text
+    assert 'class="truth"' in text
+    assert (tmp_path / "out" / "trajectory.png").exists()

@@ -69,7 +69,7 @@ def write_odometry_report(
 <main>
 {facts(_figures(trajectory, stretches, reasons is not None, evaluation))}
 {_way(trajectory, world, stretches, evaluation)}
-<section class="columns" aria-label="Along the way">{_profiles(trajectory, stretches, evaluation)}</section>
+<section class="columns three" aria-label="Along the way">{_profiles(trajectory, stretches, evaluation)}</section>
 {_table(trajectory, stretches) if reasons is not None else ""}
 </main>
 {foot(in_3d=False)}"""
