@@ -57,8 +57,8 @@ def _body(title: str, result: RegistrationResult, scene: Scene) -> str:
     why = str(result.reason).split(": ", 1)[-1]
     return f"""{head(title, "registration report", "verdict")}
 <main>
-<section id="verdict" class="verdict {mark}" aria-labelledby="said">
-<h2 id="said"><span class="mark">{word}</span> {escape(why[:1].upper() + why[1:])}</h2>
+<section id="verdict" class="verdict {mark}" aria-labelledby="conclusion">
+<h2 id="conclusion"><span class="mark">{word}</span> {escape(why[:1].upper() + why[1:])}</h2>
 <p>{escape(_evidence_sentence(result))}</p>
 {_facts(result, scene)}
 </section>
