@@ -201,5 +201,7 @@ def _edge_of(i: int, j: int, result: PairResult) -> Edge:
 def _told_of(result: PairResult) -> Told:
     through = None if result.evidence is None else result.evidence.seen_through
     strength = result.evidence.strength if result.evidence else 1.0
+    if through is None and is_certain(result):
+        through = 0.0  # no sensor of this pair is known, but of others: the verdict alone speaks for it
     look = Look(max(result.overlap, result.overlap_target), through)
     return Told(result.T_target_source, says(look), strength * weight_of(result), is_certain(result))
