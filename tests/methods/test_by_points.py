@@ -46,6 +46,14 @@ def test_a_few_points_find_their_place_on_a_dense_cloud(T):
     assert translation_error(result.T_target_source, T) < 0.02
 
 
+def test_a_few_points_of_a_dense_cloud_meet_themselves(T):
+    dense = shape(50_000)
+    result = fa.register(dense[::200], apply(T, dense), **PRIOR)
+    assert rotation_error(result.T_target_source, T) < 1e-6
+    back = fa.register(apply(T, dense), dense[::200], **PRIOR)
+    assert rotation_error(np.linalg.inv(back.T_target_source), T) < 1e-6
+
+
 def test_noise_of_a_tenth_of_the_size(rng, T):
     clean = shape(10_000)
     source, target = (cloud + rng.normal(0, 0.1, cloud.shape) for cloud in (clean, apply(T, clean)))

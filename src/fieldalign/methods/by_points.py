@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..alignment import align, descend
+from ..alignment.copies import closest
 from ..arguments import MAX_NEIGHBOURS
 from ..fields import PointField, sampled
 from ..fields.protocol import Floats
@@ -26,6 +27,7 @@ _COARSE, _MOST = 2500, 10_000  # points of a cloud, where it is smoothed: for th
 _SMOOTH = 150     # of that share of them are the neighbours that show a surface through noise of a tenth of its size
 _FIRST, _LAST = 200, 2000  # pseudo points: from each start, and of the best few poses
 _FINALISTS = 3
+_DENSER = 4       # times as many points: a much denser cloud
 _PROBED = 1000    # points of each cloud that are asked how near the other's are
 _SHARE = 0.5      # of them, the nearest ones: the rest may have no partner
 _MEETS = 1e-3     # of the distance between neighbouring points: so near, points are the same
@@ -68,7 +70,7 @@ def by_points(pair: Pair, found: Refined, angle: float, seed: int, threads: int)
     if smooth.misfit(sharp) < _CLEARLY * smooth.misfit(best):
         best = sharp
     least, chosen = smooth.misfit(best), _standing(pair, best)
-    for rival in (found, refine(pair, pair.pose(best))):
+    for rival in (found, refine(pair, pair.pose(best)), _standing(pair, exact.closest(best))):
         T = pair.motion(rival.G)
         if pair.is_within(angle, T) and smooth.misfit(T) < _CLEARLY * least:
             least, chosen = smooth.misfit(T), rival
@@ -83,10 +85,11 @@ def _size(cloud: PreparedCloud) -> float:
 
 def _smoothed(pair: Pair, most: int) -> Points:
     """Both clouds, with so many points at most, and as many neighbours as noise asks for, as far as these allow it."""
-    fields = [
-        PointField(cloud.fine.spread(most), threads=cloud.threads) for cloud in (pair.source, pair.target)
-    ]
-    neighbours = int(np.clip(min(map(len, fields)) / _SMOOTH, 1, MAX_NEIGHBOURS))
+    clouds = pair.source, pair.target
+    neighbours = int(np.clip(min(most, *(len(cloud.fine) for cloud in clouds)) / _SMOOTH, 1, MAX_NEIGHBOURS))
+    if neighbours == 1:
+        return Points(*clouds, 1)
+    fields = [PointField(cloud.fine.spread(most), threads=cloud.threads) for cloud in clouds]
     return Points(PreparedCloud(fields[0]), PreparedCloud(fields[1]), neighbours)
 
 
@@ -124,9 +127,20 @@ class Points:
 
     def misfit(self, T: Floats) -> float:
         """How far the surfaces are from each other where the source is moved by T (4, 4): the mean of the smaller half
-        of the distances, both ways, a length."""
-        there, back = apply(T, self.probes[0]), apply(inverse(T), self.probes[1])
-        return _mean_of_half(self._smooth(1, there) - there) + _mean_of_half(self._smooth(0, back) - back)
+        of the distances, a length; both ways, but from a much denser cloud to the other: that is the other's spacing.
+        """
+        ways = [(0, 1, T), (1, 0, inverse(T))]
+        counts = [len(field) for field in self.fields]
+        there = [apply(motion, self.probes[a]) for a, _, motion in ways]
+        off = [_mean_of_half(self._smooth(b, x) - x) for x, (_, b, _) in zip(there, ways, strict=True)]
+        return sum(away for away, (a, b, _) in zip(off, ways, strict=True) if counts[a] < _DENSER * counts[b])
+
+    def closest(self, T: Floats) -> Floats:
+        """T_target_source (4, 4) after the points of the sparser cloud are laid on the nearest ones of the other."""
+        source, target = self.fields
+        if len(source) <= len(target):
+            return closest(target, source.spread(_MOST), T)[0]
+        return inverse(closest(source, target.spread(_MOST), inverse(T))[0])
 
     def laid(self, turn: Floats) -> Floats:
         """A motion (4, 4) that turns as another one does and lays the centroids on each other."""
