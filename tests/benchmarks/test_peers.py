@@ -34,7 +34,7 @@ class AnalyticalPointNetLK(torch.nn.Module):
         assert p0.dtype == p1.dtype == torch.float32 and p0.shape == p1.shape == (1, utils.COUNT, 3)
         assert abs(float((p0[0].amax(0) - p0[0].amin(0)).max()) - 1) < 1e-5
         assert (maxiter, xtol, mode, data_type) == (20, 1e-7, "test", "synthetic") and p0_zero_mean and p1_zero_mean
-        assert not net.training and float(net.ptnet.layer.weight[0, 0]) == 7
+        assert not net.training and float(net.ptnet.layer.weight[0, 0].detach()) == 7
         m0, m1 = p0.mean(1), p1.mean(1)
         U, _, V = torch.linalg.svd((p0[0] - m0).T @ (p1[0] - m1))
         net.g = torch.eye(4)[None]

@@ -68,11 +68,13 @@ class Comparison:
 
     def measure(self, request: Request) -> Results:
         """Every case by every method; what the run folder holds is not done again."""
-        cases = spread(self.cases(request.data, request.seed), self._limit(request))
+        every = self.cases(request.data, request.seed)
+        cases = spread(every, self._limit(request))
         columns, faults = self._chosen(request)
         rows = self._rows(request, cases, columns)
         titles = {column.name: column.title for column in columns}
-        head = results.head(self.name, self.title, self.protocol, request.data, request.seed)
+        shown = () if len(cases) == len(every) else (f"{len(cases)} of {len(every)} registrations, spread evenly.",)
+        head = results.head(self.name, self.title, (*self.protocol, *shown), request.data, request.seed)
         return Results(cases, titles, rows, self.success, request.seed, head | {"not_measured": faults}, self.further)
 
     def _limit(self, request: Request) -> int | None:

@@ -135,7 +135,7 @@ DENSITY = Comparison(
         _MOTIONS, objects.GUESS, _THRESHOLD,
     ),
     cases=_thinned, own=(PRIOR, ANY_POSE, objects.PAPER, objects.PAPER_NEAR), peers=objects.SOME_PEERS,
-    voxel=objects.VOXEL, success=objects.NEAR, text=_table_of_density, draw=_draw_density, few=50,
+    voxel=objects.VOXEL, success=objects.NEAR, text=_table_of_density, draw=_draw_density, few=40,
 )
 
 NOISE = replace(
@@ -149,7 +149,7 @@ NOISE = replace(
         "(k = 5).",
         _MOTIONS, objects.GUESS, _THRESHOLD,
     ),
-    cases=_noisy, text=_table_of_noise, draw=_draw_noise, few=66,
+    cases=_noisy, text=_table_of_noise, draw=_draw_noise, few=44,
     own=(
         PRIOR, ANY_POSE, replace(objects.PAPER, title=f"{objects.PAPER.title}, k = 1"),
         Column("paper-k5", f"{objects.PAPER.title}, k = 5", ByPaper(replace(PRESETS["object"], neighbours=5))),

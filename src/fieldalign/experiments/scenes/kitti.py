@@ -106,12 +106,11 @@ EXPERIMENT = Parts("kitti", "Table III: KITTI", (
     _near("kitti-nearby", "DeepCLR's protocol, which the paper follows", (
         "Every 30th scan of sequences 08 to 10 with all later ones until the first that is 5 m away, every second "
         "point of each; a motion uniform in [-1, 1] degree about and [-1, 1] m along each axis, laid on scans that the "
-        "poses have laid on each other (github.com/mhorn11/deepclr). Of ../shared/data 10 pairs, spread evenly.",
+        "poses have laid on each other (github.com/mhorn11/deepclr).",
     ), LaidCases(kitti.nearby, aligned_then(twists.drawn_for_kitti), every=2)),
     _near("kitti-successive", "As the text alone would have it: successive scans", (
         "Each scan of sequences 08 to 10 and the next one, all points; a motion uniform in [0, 1] degree about and "
-        "[0, 1] m along each axis: an assumption, since the text only cites DeepCLR. Of ../shared/data 10 pairs, "
-        "spread evenly.",
+        "[0, 1] m along each axis: an assumption, since the text only cites DeepCLR.",
     ), LaidCases(kitti.successive, aligned_then(drawn_by_text))),
     _far("kitti-10m", "10 m apart, as they lie", (_APART,), LaidCases(kitti.metres_apart, as_they_lie)),
     _far("kitti-10m-turned", "10 m apart, turned about the vertical", (_APART, "Sources turned by any angle alike."),

@@ -76,7 +76,7 @@ def _benchmark(benchmark: str, overlaps: str, is_turned: bool) -> Comparison:
         title=f"{benchmark}, all pairs, {how}",
         protocol=(
             f"All pairs of {benchmark} (overlap {overlaps}), all points, no guess; of ../shared/data the pairs of this "
-            "overlap that are there" + (", 18 of them at most, spread evenly." if not is_turned else "."),
+            "overlap that are there.",
             "Sources turned by a rotation drawn from all of SO(3) alike." if is_turned else
             "Fragments as they lie: their frames are those of their first cameras, so that neighbours lie nearly "
             "aligned, which may help whoever starts from there.",
@@ -97,8 +97,7 @@ EXPERIMENT = Parts("3dmatch", "Table II: 3DMatch", (
     Comparison(
         name="3dmatch-paper",
         title="The paper's protocol",
-        protocol=(*ALIGNED, "All points of the clouds, as the paper's text says; its authors' program thins at 5 cm. "
-                  "Of ../shared/data 10 registrations, spread evenly."),
+        protocol=(*ALIGNED, "All points of the clouds, as the paper's text says; its authors' program thins at 5 cm."),
         cases=ALIGNED_CASES,
         own=(
             PRIOR, ANY_POSE,
