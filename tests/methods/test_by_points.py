@@ -6,7 +6,8 @@ import pytest
 import fieldalign as fa
 from fieldalign.evaluation import rotation_error, translation_error
 from fieldalign.methods.by_points import Points, _turns
-from fieldalign.motions import angles_between, apply
+from fieldalign.methods.pair import Pair
+from fieldalign.motions import angles_between, apply, growth
 
 PRIOR = {"init": np.eye(4), "search_angle": 50}
 
@@ -71,6 +72,13 @@ def test_the_answer_stays_within_the_angle(T):
     result = fa.register(box, apply(T, box), **PRIOR)
     assert np.degrees(angles_between(result.T_target_source, np.eye(4))) < 53
     assert rotation_error(result.T_target_source, T) < 1e-6
+
+
+def test_a_guess_of_another_size_turns_as_it_does(T):
+    source = fa.prepare(shape(400))
+    pair = Pair(source, source, 0.1, guess=T @ growth(2.0), grows=True)
+    assert pair.is_within(np.radians(5), T)
+    assert not pair.is_within(np.radians(5), np.eye(4))
 
 
 def test_same_seed_same_bits_at_any_number_of_threads(T):

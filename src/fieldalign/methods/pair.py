@@ -112,7 +112,7 @@ class Pair:
     def is_within(self, angle: float, T: Floats) -> bool:
         """Whether a motion T_target_source (4, 4) turns by no more than an angle (rad) from the guess, but for some
         slack; where there is none, any does."""
-        return self.guess is None or bool(angles_between(T, self.guess) <= angle + _SLACK)
+        return self.guess is None or bool(angles_between(T, self.rigid_guess) <= angle + _SLACK)
 
     @property
     def guessed_pose(self) -> Floats | None:
