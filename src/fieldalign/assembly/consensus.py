@@ -18,37 +18,10 @@ _LOOSE, _PER_STEP = 2.0, 0.3  # voxels that an edge may be off around a cycle, a
 
 @dataclass(frozen=True, eq=False)
 class Consensus:
-    """poses: (n, 4, 4), each in the frame of its component's root. believed: (m,), the edges that agree with them.
-    strength: (m,), of the edges, more of those that close triangles. before, by: (n,), the scan and the number of the
-    edge that each pose is from, -1 of a root."""
+    """poses: (n, 4, 4), each in the frame of its component's root. believed: (m,), the edges that agree with them."""
 
     poses: Floats
     believed: NDArray[np.bool_]
-    strength: Floats
-    before: NDArray[np.int64]
-    by: NDArray[np.int64]
-
-    def path(self, i: int, j: int) -> list[int]:
-        """The edges of the tree between two scans; none where it does not join them."""
-        (one, way), (other, back) = self._up(i), self._up(j)
-        while way and back and way[-1] == back[-1]:
-            way.pop(), back.pop()
-        return way + back if one == other else []
-
-    def _up(self, scan: int) -> tuple[int, list[int]]:
-        """The root that a scan hangs on, and the edges up to there."""
-        way = []
-        while self.before[scan] >= 0:
-            way.append(int(self.by[scan]))
-            scan = int(self.before[scan])
-        return scan, way
-
-    def roots(self) -> NDArray[np.int64]:
-        """The root (n,) that each scan hangs on."""
-        at = np.arange(len(self.before))
-        while (self.before[at] >= 0).any():
-            at = np.where(self.before[at] >= 0, self.before[at], at)
-        return at
 
 
 def consensus(count: int, edges: Sequence[Edge], voxels: Floats, extents: Floats, seed: int) -> Consensus:
@@ -63,11 +36,11 @@ def consensus(count: int, edges: Sequence[Edge], voxels: Floats, extents: Floats
     for trial in range(_TREES):
         # The first tree is that of the strongest edges; the others are drawn, strong edges first as a rule.
         weight = strength if trial == 0 else strength ** rng.uniform(0, 1) * rng.exponential(size=len(edges))
-        poses, before, by = _along_tree(count, edges, weight)
+        poses, before = _along_tree(count, edges, weight)
         agrees = _agrees(edges, poses, _depth(before), voxels, extents)
         score = float((np.minimum(strength, 3 * np.median(strength)) * agrees).sum())
         if score > best_score + 1e-9:
-            best, best_score = Consensus(poses, agrees, strength, before, by), score
+            best, best_score = Consensus(poses, agrees), score
         if agrees.all():  # as on a graph without cycles
             break
     assert best is not None
@@ -101,10 +74,8 @@ def _size(errors: Floats, extents: Floats) -> Floats:
     return np.asarray(np.linalg.norm(errors[:, 3:], axis=1) + np.linalg.norm(errors[:, :3], axis=1) * extents / 4)
 
 
-def _along_tree(
-    count: int, edges: Sequence[Edge], weight: Floats
-) -> tuple[Floats, NDArray[np.int64], NDArray[np.int64]]:
-    """Poses (n, 4, 4) along the spanning tree of the greatest weights, and the scan and the edge that each is from."""
+def _along_tree(count: int, edges: Sequence[Edge], weight: Floats) -> tuple[Floats, NDArray[np.int64]]:
+    """Poses (n, 4, 4) along the spanning tree of the greatest weights, and the scan that each is from, -1 of a root."""
     from scipy.sparse import csr_matrix
     from scipy.sparse.csgraph import breadth_first_order, connected_components, minimum_spanning_tree
 
@@ -112,15 +83,14 @@ def _along_tree(
     between = {(min(a, b), max(a, b)): k for k, (a, b) in enumerate(zip(i, j, strict=True))}
     tree = minimum_spanning_tree(csr_matrix((1 / weight, (i, j)), shape=(count, count)))
     _, component = connected_components(tree, directed=False)
-    poses, above, by = np.tile(np.eye(4), (count, 1, 1)), np.full(count, -1), np.full(count, -1)
+    poses, above = np.tile(np.eye(4), (count, 1, 1)), np.full(count, -1)
     for root in np.unique(component, return_index=True)[1]:
         order, before = breadth_first_order(tree, root, directed=False)
         for scan in order[1:]:
             last = before[scan]
-            number = between[min(last, scan), max(last, scan)]
-            poses[scan] = poses[last] @ _from_to(edges[number], last)
-            above[scan], by[scan] = last, number
-    return poses, above, by
+            poses[scan] = poses[last] @ _from_to(edges[between[min(last, scan), max(last, scan)]], last)
+            above[scan] = last
+    return poses, above
 
 
 def _depth(before: NDArray[np.int64]) -> NDArray[np.int64]:

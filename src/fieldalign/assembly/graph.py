@@ -17,7 +17,6 @@ from .pose_graph import Edge
 from .world import Given
 
 _AGREE = 1.5    # more than so many uncertain pairs that agree join what they lie between, unclear ones count less
-_NEAR = 20      # scans around each one, of its component, that are looked at
 _CLOSE = 1.7    # by so much the margin may fall short; by anything where no known sensor objects
 
 Pair = tuple[int, int]
@@ -94,9 +93,7 @@ class Graph:
         return {(at.i, at.j): look.on for at in self._near() if (look := self._looks.find(at)) is not None}
 
     def _near(self) -> Iterator[Laid]:
-        label = self._parts.label if self._is_seen else self.component
-        for number in np.flatnonzero(np.bincount(label) > 1):
-            yield from self._looks.near(self.poses, np.flatnonzero(label == number), _NEAR)
+        return self._looks.within(self.poses, self._parts.label if self._is_seen else self.component)
 
     def believed(self, members: Sequence[int]) -> list[Edge]:
         """The edges between some scans that the others do not contradict."""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..fields.protocol import Floats
 from ..motions import inverse
 
+_NEAR = 20         # scans around each one, of its part, that are looked at
 _AS_BEFORE = 0.1  # voxels: a pair that lies no further off lies where it was seen
 
 
@@ -74,6 +75,11 @@ class Looks:
         for a, b in np.argwhere(np.triu(may, 1)):
             i, j = int(members[a]), int(members[b])
             yield Laid(i, j, inverse(poses[i]) @ poses[j])
+
+    def within(self, poses: Floats, label: NDArray[np.int64]) -> Iterator[Laid]:
+        """The near pairs of every part, where label (n,) numbers the part of each scan."""
+        for part in np.flatnonzero(np.bincount(label) > 1):
+            yield from self.near(poses, np.flatnonzero(label == part), _NEAR)
 
     def around(self, k: int, pose: Floats, poses: Floats, members: NDArray[np.int64]) -> list[Laid]:
         """The pairs of scan k, at a pose (4, 4), with members (m,) that lie near it, the nearest first."""

@@ -28,7 +28,6 @@ _SURE, _JOINS = 0.1, 1.0  # what must speak for joining parts, with a certain pa
 _BETTER = 0.1      # by so much must the sum grow where scans move or are parted
 _RIVALS, _CLEARLY = 4, 1.25  # motions of two parts that are weighed; by what factor one must be better than the next
 _LOOKED = 40       # pairs, the nearest, that are looked at of two parts before they are joined
-_NEAR = 20         # scans around each one, of a part, that are looked at
 
 Pair = tuple[int, int]
 
@@ -115,8 +114,7 @@ class Parts:
         return np.flatnonzero(self.label == part)
 
     def _near(self) -> Iterator[Laid]:
-        for part in self._of_several():
-            yield from self._looks.near(self.poses, self._members(part), _NEAR)
+        return self._looks.within(self.poses, self.label)
 
     def _around(self, k: int, pose: Floats, part: int) -> list[Laid]:
         return self._looks.around(k, pose, self.poses, self._members(part))

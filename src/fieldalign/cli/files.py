@@ -6,12 +6,12 @@ from pathlib import Path
 
 import fieldalign as fa
 
+from .. import whole_file
 from ..clouds.files import writer_of
 from ..errors import ArgumentError
 from ..fields import DistanceField, MeshField, spread_over
 from ..fields.files import check_mesh_path, is_mesh_path, write_mesh
 from ..motions import Matrix, apply
-from ..whole_file import replacing
 
 Shape = fa.PointCloud | DistanceField
 
@@ -39,13 +39,8 @@ def check_folder(*paths: str | None) -> None:
 
 def write_text(path: str | None, text: str) -> None:
     """Writes a file, whole or not at all; nothing for None and for "-", which is stdout."""
-    if path is None or path == "-":
-        return
-    try:
-        with replacing(path) as unfinished:
-            unfinished.write_text(text, encoding="utf-8", newline="")
-    except OSError as error:
-        raise ArgumentError(f"{path} cannot be written: {error.strerror or error}") from error
+    if path is not None and path != "-":
+        whole_file.write_text(text, path)
 
 
 def check_picture(path: str | None) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 from ..assembly.record import RunRecord
 from ..assembly.work import Task
 from ..errors import ArgumentError
+from ..whole_file import write_text
 from . import results
 from .alone import telling
 from .case import Case, spread
@@ -60,7 +61,7 @@ class Comparison:
         path = request.output / self.name
         text = self.text(measured)
         files = [results.write_json(measured.to_dict(), path.with_suffix(".json")),
-                 results.write_text(results.page(measured.head, text, len(measured.cases)), path.with_suffix(".md"))]
+                 write_text(results.page(measured.head, text, len(measured.cases)), path.with_suffix(".md"))]
         if self.draw is not None:
             self.draw(measured, path.with_suffix(".png"))
             files.append(path.with_suffix(".png"))

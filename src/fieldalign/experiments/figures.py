@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 Item = TypeVar("Item")
 
-COLUMN, PAGE = 3.5, 7.16  # inches, of the journal that the paper appeared in
+COLUMN = 3.5  # inches, of the journal that the paper appeared in
 SMALL, LARGE = 6.0, 7.5  # points: the smallest and the largest letters
 INK = "0.2"
 SCAN, CLOSED = 0.6, 1.6  # how much of a panel points cover: those of a scan; those of a surface without holes

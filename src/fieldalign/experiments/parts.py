@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from ..errors import DataSetError
+from ..whole_file import write_text
 from . import results
 from .comparison import Comparison, asked_of
 from .request import Report, Request
@@ -45,7 +46,7 @@ class Parts:
         if not files:
             raise left_out[0]
         below = [self.beside, *(f"Left out: {error}." for error in left_out)]
-        files.append(results.write_text("\n\n".join([*pages, *below]) + "\n", request.output / f"{self.name}.md"))
+        files.append(write_text("\n\n".join([*pages, *below]) + "\n", request.output / f"{self.name}.md"))
         return Report("\n\n".join([*texts, *below]), files)
 
     def _asked(self, request: Request) -> list[tuple[Comparison, Request]]:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..motions import Matrix
-from ..whole_file import replacing
+from ..whole_file import write_text
 from . import measures
 from .case import Case
 
@@ -167,13 +167,6 @@ def write_json(found: Mapping[str, Any], path: Path) -> Path:
     """Writes results, whole or not at all, a line for each pair; returns the path."""
     lines = [f" {json.dumps(key)}: {_listed(value)}" for key, value in found.items()]
     return write_text("{\n" + ",\n".join(lines) + "\n}\n", path)
-
-
-def write_text(text: str, path: Path) -> Path:
-    """Writes a file, whole or not at all; returns the path."""
-    with replacing(path) as unfinished:
-        unfinished.write_text(text, encoding="utf-8")
-    return path
 
 
 def _listed(value: Any) -> str:

@@ -19,7 +19,7 @@ from typing import Any
 
 from .. import __version__
 from ..errors import ArgumentError
-from ..whole_file import replacing
+from ..whole_file import write_text
 
 _SUFFIXES = (".html", ".htm")
 
@@ -37,14 +37,7 @@ class Page:
 
 def write_page(page: Page, path: str | os.PathLike[str]) -> Path:
     """Writes a page, whole or not at all; returns the path. Raises ArgumentError where it cannot be written."""
-    path = checked_page_path(path)
-    content = rendered(page).encode("utf-8")
-    try:
-        with replacing(path) as unfinished:
-            unfinished.write_bytes(content)
-    except OSError as error:
-        raise ArgumentError(f"{path} cannot be written: {error.strerror or error}") from error
-    return path
+    return write_text(rendered(page), checked_page_path(path))
 
 
 def checked_page_path(path: str | os.PathLike[str]) -> Path:

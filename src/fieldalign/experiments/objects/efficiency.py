@@ -14,6 +14,7 @@ import numpy as np
 from ...fields.protocol import Floats
 from ...motions import exp_twist
 from ...threads import resolve_threads
+from ...whole_file import write_text
 from .. import curves, tables
 from ..alone import Alone
 from ..case import Case, Moved, spread
@@ -23,7 +24,7 @@ from ..data_sets import modelnet, twists
 from ..data_sets.shapes import Shape
 from ..published import BY_EXPERIMENT
 from ..request import Report, Request
-from ..results import Results, page, write_json, write_text
+from ..results import Results, page, write_json
 from ..tables import Cell, number
 from ..trial import Trial
 from . import common as objects

@@ -15,6 +15,7 @@ from ...evaluation import Evaluation, evaluate
 from ...motions import Matrix
 from ...odometry.trajectory import Trajectory
 from ...settings import PRESETS
+from ...whole_file import write_text
 from .. import results, tables
 from ..alone import telling
 from ..comparison import asked_of
@@ -153,7 +154,7 @@ def _report(
         for name, evaluation in evaluations.items()
     ]
     files = [results.write_json(head | {"methods": found}, path.with_suffix(".json")),
-             results.write_text(results.page(head, text, len(drive)), path.with_suffix(".md"))]
+             write_text(results.page(head, text, len(drive)), path.with_suffix(".md"))]
     return Report(text, files + _picture(path.with_suffix(".png"), evaluations))
 
 
