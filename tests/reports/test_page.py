@@ -147,7 +147,7 @@ def test_what_comes_from_outside_stays_text(clouds, result, tmp_path):
     page = Reader(write_report(result, *clouds[:2], tmp_path / "evil.html", EVIL).read_text("utf-8"))
     assert page.texts["title"][0] == EVIL
     assert page.texts["h1"] == [EVIL]
-    assert len(page.texts["script"]) == 4
+    assert len(page.texts["script"]) == 6
     assert "img" not in [tag for tag, _ in page.elements]
     held = Reader(rendered(Page("t", "", data={"name": EVIL})))
     assert json.loads(held.texts["script"][0]) == {"name": EVIL}
@@ -306,7 +306,8 @@ def test_the_package_holds_what_a_page_is_made_of():
     from importlib.resources import files
 
     names = {file.name for file in files("fieldalign.reports").joinpath("page").iterdir()}
-    assert {"page.css", "page.js", "viewer.js", "viewer.html", "three.min.js", "three.LICENSE", "README.md"} <= names
+    assert {"page.css", "page.js", "table.js", "stage.js", "camera.js", "pair.js", "model.js", "three.min.js",
+            "three.LICENSE", "README.md"} <= names
 
 
 # ---- In a real browser
@@ -342,7 +343,7 @@ def blind(chromium):
 
 def test_without_webgl_all_else_stands(blind, report):
     blind.open(report)
-    assert blind.run("getComputedStyle(document.getElementById('no-view')).display") == "block"
+    assert blind.run("getComputedStyle(document.querySelector('.no-view')).display") == "block"
     assert blind.run("getComputedStyle(document.querySelector('.sliding')).display") == "none"
     blind.click("#tab2")
     assert not blind.run("document.getElementById('form2').hidden")

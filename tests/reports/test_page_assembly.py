@@ -44,7 +44,7 @@ def test_the_page_holds_every_pair_scan_and_reason(report, assembly):
     assert text.count('class="node"') == 3
     assert text.count('<path class="edge ') == 3
     assert "<b>&lt;b&gt;noise</b>: " in text
-    assert text.count("<script") == 5
+    assert text.count("<script") == 7
 
 
 def test_the_same_assembly_gives_the_same_bytes(report, assembly, clouds, tmp_path):

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import click
 
 from ..assembly.executor import as_executor
 from ..errors import ArgumentError
-from ..experiments import NAMES, Request, run
+from ..experiments import NAMES, Report, Request, run
 from ..threads import resolve_threads
 from .executors import bar, chosen_executor, executor_options
+from .files import check_report
 
 
 @click.command("experiment")
@@ -25,6 +27,8 @@ from .executors import bar, chosen_executor, executor_options
               help="A checkout of PointNetLK-Revisited with its weights, to be measured, too (with --peers).")
 @click.option("--limit", type=click.IntRange(min=1),
               help="At most so many cases, spread evenly; by default all, of ../shared/data as many as take minutes.")
+@click.option("--report", "page", type=click.Path(dir_okay=False),
+              help="Write a page: the methods side by side, and every registration, the worst first and in 3D (.html).")
 @executor_options
 def command(
     name: str,
@@ -34,6 +38,7 @@ def command(
     columns: str | None,
     pointnetlk: str | None,
     limit: int | None,
+    page: str | None,
     run_folder: str | None,
     workers: int | None,
     dask: str | None,
@@ -45,6 +50,9 @@ def command(
     into the folder, which is made where it is not there; of several tables in one NAME.md, each has a .json of its own.
     Called again after an interruption it goes on from there.
     """
+    check_report(page)
+    if page is not None and NAMES[name][0].startswith("pictures."):
+        raise ArgumentError(f"--report shows registrations, but {name} is a picture: it has none")
     folder = _folder(output)
     if pointnetlk is not None and peers is None:
         raise ArgumentError("--pointnetlk-revisited needs --peers FOLDER, which holds its adapter")
@@ -56,10 +64,22 @@ def command(
             None if peers is None else Path(peers), checkouts,
             Path(run_folder) if run_folder else None, tell,
         ))
+        if page is not None:
+            _write_page(report, page, name, lambda finished, of: tell("drawing", finished, of))
     click.echo(report.text)
     for file in report.files:
         click.echo(f"wrote {file}")
     return 0
+
+
+def _write_page(report: Report, path: str, name: str, progress: Callable[[int, int], None]) -> None:
+    """Of registrations a table; of a drive the first method's trajectory beside the truth."""
+    from ..reports import write_experiment_report, write_odometry_report
+
+    if report.results:
+        write_experiment_report(report.results, path, progress=progress)
+    for title, evaluation in list(report.drives.items())[:1]:
+        write_odometry_report(evaluation.trajectory, path, evaluation=evaluation, title=f"{name}: {title}")
 
 
 def _folder(output: str) -> Path:

@@ -12,6 +12,7 @@ from ..fields import PointField
 from ..fields.protocol import Floats
 from ..reports.painting import Image, Window
 from ..reports.shading import Layer, paint_surfaces
+from ..reports.views import sphere
 from ..whole_file import replacing
 from .request import Report, Request
 from .results import head, write_json
@@ -53,9 +54,7 @@ def layer(points: Floats, colors: Floats | Sequence[float], covered: float = SCA
 
 def balls(places: Floats, color: Sequence[float], radius: float) -> Layer:
     """Little balls at places (L, 3): they hide what is behind them, as dots in a plane would not."""
-    z = 1 - (2 * np.arange(_BALL) + 1) / _BALL  # a spiral from pole to pole
-    turn = np.pi * (1 + np.sqrt(5)) * np.arange(_BALL)
-    ball = np.stack([np.sqrt(1 - z**2) * np.cos(turn), np.sqrt(1 - z**2) * np.sin(turn), z], axis=1)
+    ball = sphere(_BALL)
     points = (places[:, None] + radius * ball).reshape(-1, 3)
     return Layer(points, np.tile(ball, (len(places), 1)), np.broadcast_to(np.asarray(color, float), points.shape))
 

@@ -32,6 +32,7 @@ class Parts:
         """
         asked_of({name: part for part in self.parts for name in part.columns(request)}, request)
         pages, texts, files = [f"# {self.title}", ""], [], []
+        every: list[results.Results] = []
         left_out: list[DataSetError] = []
         for part, asked in self._asked(request):
             try:
@@ -39,6 +40,7 @@ class Parts:
             except DataSetError as error:
                 left_out.append(error)
                 continue
+            every.append(measured)
             text = part.text(measured)
             pages.append(results.page(measured.head, text, len(measured.cases), "##"))
             texts += [f"{part.title}\n\n{text}\n"]
@@ -47,7 +49,7 @@ class Parts:
             raise left_out[0]
         below = [self.beside, *(f"Left out: {error}." for error in left_out)]
         files.append(write_text("\n\n".join([*pages, *below]) + "\n", request.output / f"{self.name}.md"))
-        return Report("\n\n".join([*texts, *below]), files)
+        return Report("\n\n".join([*texts, *below]), files, every)
 
     def _asked(self, request: Request) -> list[tuple[Comparison, Request]]:
         """What each part is asked: for those of the columns that it has, and for a record of its own; without those

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeAlias
 
 from ..assembly.executor import Executor
+from ..evaluation import Evaluation
+from .results import Results
 
 Tell: TypeAlias = Callable[[str, int, int | None], None]  # a stage, how much of it is done, and of how much
 
@@ -43,7 +45,11 @@ class Request:
 
 @dataclass(frozen=True)
 class Report:
-    """What an experiment answers: a text for the terminal, and the files that it has written."""
+    """What an experiment answers: a text for the terminal, the files that it has written, and what a page of it shows:
+    the results of its registrations, part by part, or the trajectories beside the truth, by the names of their methods.
+    """
 
     text: str
     files: list[Path]
+    results: Sequence[Results] = ()
+    drives: Mapping[str, Evaluation] = field(default_factory=dict)

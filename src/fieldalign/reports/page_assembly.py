@@ -15,12 +15,14 @@ from ..errors import ArgumentError
 from ..fields.protocol import Floats
 from ..motions import angles_between, apply, inverse
 from ..prepare import CloudLike
+from .model_scene import component_models
 from .page import Page, checked_page_path, facts, foot, head, write_page
-from .pair_table import Progress, Row, strength, table_beside_view, table_data, table_scripts
+from .pair_table import Progress, Row, Shelf, strength, table_beside_view, table_data, table_scripts
 from .scan_graph import Edge, scan_graph
+from .viewer import MODEL_SCRIPTS, model_viewer
 
 _COLUMNS = ("off by", "turned off", "evidence", "overlap")
-_GRAPHS = 6    # components that are drawn
+_SHOWN = 6     # components that are drawn
 _STRONG = 1.5  # times the evidence that is asked for
 
 
@@ -34,8 +36,9 @@ def write_assembly_report(
 ) -> Path:
     """Writes an assembly as one HTML page; returns the path.
 
-    The page shows each component from above with its scans and the pairs between them, a table of the pairs, those that
-    are not believed and those that fit the poses of all worst first, each with both scans in 3D a click away, how well
+    The page shows each component in 3D, and from above with its scans and the pairs between them, a table of the pairs,
+    those that are not believed and those that fit the poses of all worst first, each with both scans in 3D a click
+    away, how well
     each scan is placed, and which are left out, and why.
 
     assembly: of `fa.assemble`. clouds: as they were handed in there; they are read again for the pictures. path: ends
@@ -52,12 +55,13 @@ def write_assembly_report(
     pairs = [(i, j, result, True) for i, j, result in assembly.edges]
     pairs += [(i, j, result, False) for i, j, result in assembly.doubted]
     pairs.sort(key=lambda pair: (pair[3], -_off(assembly, pair)[0]))
-    rows = [_row(assembly, pair, known, clouds) for pair in pairs]
-    data = table_data(rows, progress)
+    shelf = Shelf()
+    rows = [_row(assembly, pair, known, clouds, shelf) for pair in pairs]
+    data = table_data(rows, progress) | {"models": component_models(assembly, known, _SHOWN)}
     name = title or f"{len(clouds)} scans"
     body = _body(name, assembly, known, pairs, table_beside_view(rows, _COLUMNS, data) if rows else "")
-    scripts = table_scripts(data) if rows else ("page.js",)
-    return write_page(Page(name, body, scripts, data), path)
+    scripts = (MODEL_SCRIPTS if data["models"] else ()) + (table_scripts(data) if rows else ("page.js",))
+    return write_page(Page(name, body, tuple(dict.fromkeys(scripts)), data), path)
 
 
 Pair = tuple[int, int, PairResult, bool]  # cloud j on cloud i, and whether it is believed
@@ -81,7 +85,9 @@ def _off(assembly: Assembly, pair: Pair) -> tuple[float, float]:
     return float(np.linalg.norm(shift)), float(np.degrees(angles_between(ours, result.T_target_source)))
 
 
-def _row(assembly: Assembly, pair: Pair, names: Sequence[str], clouds: Sequence[CloudLike]) -> Row:
+def _row(
+    assembly: Assembly, pair: Pair, names: Sequence[str], clouds: Sequence[CloudLike], shelf: Shelf
+) -> Row:
     i, j, result, believed = pair
     length, degrees = _off(assembly, pair)
     overlap = max(result.overlap, result.overlap_target)
@@ -92,7 +98,8 @@ def _row(assembly: Assembly, pair: Pair, names: Sequence[str], clouds: Sequence[
     )
     said = result.verdict if believed else f"Not believed: other pairs contradict it. {result.verdict}"
     word = "believed" if believed else "not believed"
-    return Row(f"{names[j]} onto {names[i]}", result, word, said, believed, numbers, (clouds[j], clouds[i]))
+    return Row(f"{names[j]} onto {names[i]}", word, said, believed, numbers, pose=result.T_target_source,
+               picture=shelf.picture(result, (clouds[j], clouds[i])))
 
 
 def _body(title: str, assembly: Assembly, names: Sequence[str], pairs: Sequence[Pair], table: str) -> str:
@@ -102,15 +109,24 @@ def _body(title: str, assembly: Assembly, names: Sequence[str], pairs: Sequence[
         "pairs believed": str(len(assembly.edges)), "pairs not believed": str(len(assembly.doubted)),
         "pairs tried": str(assembly.tried), "time": f"{sum(assembly.seconds.values()):.1f} s",
     }
-    return f"""{head(title, "assembly report", "graphs")}
-<main class="wide">
+    return f"""{head(title, "assembly report", "results")}
+<main class="wide" id="results">
 {facts(figures)}
 {_left_out(assembly, names)}
+{_models(assembly)}
 <section id="graphs" class="columns" aria-label="Components from above">{_graphs(assembly, names, pairs)}</section>
 <section class="pairs" aria-label="Pairs">{table}</section>
 {_placed(assembly, names)}
 </main>
-{foot()}"""
+{foot(in_3d=bool(assembly.components))}"""
+
+
+def _models(assembly: Assembly) -> str:
+    """The viewer of the components; of none, nothing."""
+    if not assembly.components:
+        return ""
+    tints = {"scan": "scan", "height": "height", "plain": "nothing"}
+    return model_viewer("The model in 3D", tints, {}, min(len(assembly.components), _SHOWN))
 
 
 def _graphs(assembly: Assembly, names: Sequence[str], pairs: Sequence[Pair]) -> str:
@@ -123,7 +139,7 @@ def _graphs(assembly: Assembly, names: Sequence[str], pairs: Sequence[Pair]) -> 
         "<figcaption>From above. A line is a pair that was accepted: green with evidence to spare, ochre with little, "
         "dashed where the others contradict it. A click on a line shows the pair.</figcaption></figure>"
         for number, (members, model) in enumerate(
-            zip(assembly.components[:_GRAPHS], assembly.models, strict=False), 1
+            zip(assembly.components[:_SHOWN], assembly.models, strict=False), 1
         )
     ]
     return "".join(drawn)

@@ -12,7 +12,7 @@ from ..assembly.pair_result import PairResult
 from ..errors import ArgumentError
 from ..verdict import Reason
 from .page import Page, checked_page_path, facts, foot, head, write_page
-from .pair_table import Progress, Row, strength, table_beside_view, table_data, table_scripts
+from .pair_table import Progress, Row, Shelf, strength, table_beside_view, table_data, table_scripts
 
 _COLUMNS = ("evidence", "overlap", "residual", "ms")
 
@@ -39,7 +39,8 @@ def write_batch_report(
     if len(pairs) != len(results):
         raise ArgumentError(f"pairs must be as many as the {len(results)} results, but are {len(pairs)}")
     order = sorted(range(len(results)), key=lambda k: (results[k].accepted, strength(results[k])))
-    rows = [_row(results[k], pairs[k]) for k in order]
+    shelf = Shelf()
+    rows = [_row(results[k], pairs[k], shelf) for k in order]
     data = table_data(rows, progress)
     name = title or f"{len(results)} pairs"
     counts = Counter(result.reason for result in results)
@@ -52,7 +53,7 @@ def write_batch_report(
     return write_page(Page(name, body, table_scripts(data), data), path)
 
 
-def _row(result: PairResult, pair: Sequence[Any]) -> Row:
+def _row(result: PairResult, pair: Sequence[Any], shelf: Shelf) -> Row:
     time = 1e3 * sum(result.seconds.values())
     overlap = max(result.overlap, result.overlap_target)
     numbers = (
@@ -61,8 +62,9 @@ def _row(result: PairResult, pair: Sequence[Any]) -> Row:
     )
     failed = result.error is not None
     return Row(
-        f"{result.source} onto {result.target}", result, _word(result.reason), result.verdict, result.accepted,
-        [None] * len(numbers) if failed else numbers, pair,
+        f"{result.source} onto {result.target}", _word(result.reason), result.verdict, result.accepted,
+        [None] * len(numbers) if failed else numbers, pose=None if failed else result.T_target_source,
+        picture=shelf.picture(result, pair),
     )
 
 

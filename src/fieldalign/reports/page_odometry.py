@@ -19,8 +19,10 @@ from ..motions import inverse
 from ..odometry.reason import Tracking
 from ..odometry.trajectory import Trajectory
 from .charts import profile
+from .model_scene import Way, drive_model
 from .page import Page, checked_page_path, facts, foot, head, write_page
 from .plan import Plan, path_of
+from .viewer import MODEL_SCRIPTS, model_viewer
 
 _BACKDROP = 12_000  # points of the map
 _TOLD = 200         # stretches in the table
@@ -33,6 +35,10 @@ class Stretch:
     first: int
     last: int
     reason: Tracking
+
+    def of(self, places: Floats) -> Floats:
+        """The part of the places (n, ...) of all frames from the frame before it to the one after."""
+        return places[max(self.first - 1, 0) : self.last + 2]
 
     def __str__(self) -> str:
         return f"frame {self.first}" if self.first == self.last else f"frames {self.first} to {self.last}"
@@ -49,8 +55,8 @@ def write_odometry_report(
 ) -> Path:
     """Writes a drive as one HTML page; returns the path.
 
-    The page shows the trajectory from above over the map, the stretches that were not tracked (degenerate, lost,
-    missing), and along the way height, standard deviation and, with the truth, the errors.
+    The page shows the trajectory over the map in 3D and from above, the stretches that were not tracked (degenerate,
+    lost, missing), and along the way height, standard deviation and, with the truth, the errors.
 
     trajectory: one pose a frame. reasons: what each step came to (`fa.Odometry.last.reason`), as many; None: not known.
     world: the map, in the trajectory's world. evaluation: of `fa.evaluate` for this trajectory. path: ends in .html; it
@@ -65,15 +71,18 @@ def write_odometry_report(
         raise ArgumentError(f"reasons must be one for each of the {len(trajectory)} poses, but are {len(reasons)}")
     stretches = _stretches([Tracking(reason) for reason in reasons or []])
     name = title or "A drive"
-    body = f"""{head(name, "odometry report", "way")}
-<main>
+    ways = _ways(trajectory, stretches, _truth_here(evaluation))
+    body = f"""{head(name, "odometry report", "results")}
+<main id="results">
 {facts(_figures(trajectory, stretches, reasons is not None, evaluation))}
+{model_viewer("The drive in 3D", {"height": "height", "plain": "nothing"}, ways)}
 {_way(trajectory, world, stretches, evaluation)}
 <section class="columns three" aria-label="Along the way">{_profiles(trajectory, stretches, evaluation)}</section>
 {_table(trajectory, stretches) if reasons is not None else ""}
 </main>
-{foot(in_3d=False)}"""
-    return write_page(Page(name, body), path)
+{foot()}"""
+    data = {"models": [drive_model(world, ways)]}
+    return write_page(Page(name, body, (*MODEL_SCRIPTS, "page.js"), data), path)
 
 
 def _stretches(reasons: Sequence[Tracking]) -> list[Stretch]:
@@ -101,6 +110,23 @@ def _figures(
     return figures
 
 
+def _truth_here(evaluation: Evaluation | None) -> Floats | None:
+    """Where the sensor truly was (n, 3), in the trajectory's world."""
+    return None if evaluation is None else (
+        evaluation.truth.in_world(inverse(evaluation.T_truth_trajectory)).positions
+    )
+
+
+def _ways(trajectory: Trajectory, stretches: Sequence[Stretch], truth: Floats | None) -> dict[str, Way]:
+    """The lines in 3D; of those in one place the first is seen."""
+    places = trajectory.positions
+    ways = {"start": Way([places[:1]], "pseudo", "start", 12.0)}
+    if stretches:
+        ways["lost"] = Way([s.of(places) for s in stretches], "contradicts", "not tracked", 8.0)
+    ways["way"] = Way([places], "source", "trajectory", 6.0)
+    return ways if truth is None else ways | {"truth": Way([truth], "target", "truth", 3.0)}
+
+
 def _way(
     trajectory: Trajectory, world: PointCloud | None, stretches: Sequence[Stretch], evaluation: Evaluation | None
 ) -> str:
@@ -108,8 +134,7 @@ def _way(
     ground = np.empty((0, 3)) if world is None else np.asarray(world.points, float)
     plan = Plan(ground, trajectory.positions, _BACKDROP)
     truth, told = "", ""
-    if evaluation is not None:
-        truth_here = evaluation.truth.in_world(inverse(evaluation.T_truth_trajectory)).positions
+    if (truth_here := _truth_here(evaluation)) is not None:
         truth = f'<path class="truth" d="{path_of(plan.at(truth_here))}"/>'
         told = '<li><i class="swatch target"></i>truth</li>'
     places = plan.at(trajectory.positions)
@@ -125,10 +150,9 @@ def _way(
 
 
 def _mark(stretch: Stretch, places: Floats) -> str:
-    """A stretch on the way, from the frame before it to the one after."""
-    part = places[max(stretch.first - 1, 0) : stretch.last + 2]
     return (
-        f'<path class="off" d="{path_of(part)}"><title>{stretch}: {escape(str(stretch.reason))}</title></path>'
+        f'<path class="off" d="{path_of(stretch.of(places))}"><title>{stretch}: {escape(str(stretch.reason))}'
+        "</title></path>"
     )
 
 

@@ -15,11 +15,11 @@ from ..result import RegistrationResult
 from ..threads import resolve_threads
 from .charts import curve, histogram, share_bar
 from .evidence_table import certainty_table, evidence_table
-from .page import Page, checked_page_path, facts, foot, head, part, write_page
+from .page import Page, checked_page_path, facts, foot, head, write_page
 from .pose_forms import in_space, pose_forms
 from .scene import Scene, scene_of, viewer_data
+from .viewer import PAIR_SCRIPTS, pair_viewer
 
-_SCRIPTS = ("three.min.js", "viewer.js", "page.js")
 _SCALED = (4, 7)  # rows of the information of a similarity, in the plane and in space
 _OTHERS = 4  # alternatives that can be looked at
 
@@ -46,10 +46,11 @@ def write_report(
     """
     path = checked_page_path(path)
     pair = prepare_pair(source, target, resolve_threads(None), True, len(result.information) in _SCALED)
-    scene = scene_of(result, *pair)
+    scene = scene_of(result.T_target_source, *pair, result=result)
     name = title or "Source onto target"
-    data = {"scenes": [viewer_data(scene, result.alternatives[:_OTHERS])]}
-    return write_page(Page(name, _body(name, result, scene), _SCRIPTS, data), path)
+    others = {f"alternative {k}": other.T_target_source for k, other in enumerate(result.alternatives[:_OTHERS], 1)}
+    data = {"scenes": [viewer_data(scene, others)]}
+    return write_page(Page(name, _body(name, result, scene), (*PAIR_SCRIPTS, "page.js"), data), path)
 
 
 def _body(title: str, result: RegistrationResult, scene: Scene) -> str:
@@ -62,7 +63,7 @@ def _body(title: str, result: RegistrationResult, scene: Scene) -> str:
 <p>{escape(_evidence_sentence(result))}</p>
 {_facts(result, scene)}
 </section>
-{part('viewer.html')}
+{pair_viewer()}
 <section class="columns">
 {evidence_table(result)}
 {certainty_table(result)}

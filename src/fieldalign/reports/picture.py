@@ -36,7 +36,7 @@ def before_and_after(
     T_target_source: ArrayLike,
     path: str | os.PathLike[str],
     title: str | None = None,
-    up: ArrayLike = (0.0, 0.0, 1.0),
+    up: ArrayLike | None = None,
 ) -> Path:
     """Draw both clouds as they came, and again with the source moved by T_target_source; returns the path.
 
@@ -44,20 +44,21 @@ def before_and_after(
     T_target_source: (4, 4), maps source points into the target frame.
     path: its suffix picks PNG, SVG or PDF (with the points as images); it is replaced whole or not at all.
     title: one line; without it, how far the source was turned and moved.
-    up: (3,), roughly upward in the target frame; the views are levelled on a floor, street or ceiling.
+    up: (3,), roughly upward in the target frame; the views are levelled on a floor, street or ceiling. None: z, or what
+        the target tells where a camera has seen it (y down, z ahead).
 
     A ceiling is left out, so that one looks into the room. Raises MissingExtraError without matplotlib, and
     ArgumentError for a path, cloud, pose or direction that cannot be.
     """
     path = checked_path(path)
     T = _checked(T_target_source, (4, 4), "T_target_source")
-    upward = _checked(up, (3,), "up")
-    if not upward.any():
+    upward = None if up is None else _checked(up, (3,), "up")
+    if upward is not None and not upward.any():
         raise ArgumentError("up must be a direction, but is the zero vector")
     before, fixed = _thinned(source, "source"), _thinned(target, "target")
     after = before @ T[:3, :3].T + T[:3, 3]
 
-    vertical = views.level(fixed, upward)
+    vertical = views.upright(fixed) if upward is None else views.level(fixed, upward)
     ahead = views.ahead(_viewpoint(target), fixed, vertical)
     rows = {
         "from above": views.from_above(vertical, ahead),

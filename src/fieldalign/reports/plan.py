@@ -10,21 +10,18 @@ from . import views
 WIDE = 720.0
 _HIGHEST, _MARGIN = 560.0, 24.0
 _STRAYS = 0.2  # per cent of the points on each side that may lie outside
-_UP = np.array([0.0, 0.0, 1.0])
 
 
 class Plan:
     """points: (N, 3), the cloud; the world's x points to the right. within: (M, 3), places that must lie in the frame,
-    whatever strays. most: so many points are drawn at most.
+    whatever strays. most: so many points are drawn at most. up: (3,), upwards; None: as all of it tells.
 
     height: of the frame, which is WIDE wide. backdrop: the points as a path of strokes without a length.
     """
 
-    def __init__(self, points: Floats, within: Floats, most: int) -> None:
-        both = np.concatenate([points, within])
-        up = views.level(both, _UP)
-        ahead = np.cross(up, np.eye(3)[0] if abs(up[0]) < 0.9 else np.eye(3)[1])
-        self._axes = views.from_above(up, ahead / np.linalg.norm(ahead))[:2]
+    def __init__(self, points: Floats, within: Floats, most: int, up: Floats | None = None) -> None:
+        up = views.upright(np.concatenate([points, within])) if up is None else up
+        self._axes = views.from_above(up, views.northward(up))[:2]
         seen, must = points @ self._axes.T, within @ self._axes.T
         corners = np.percentile(seen, (_STRAYS, 100 - _STRAYS), axis=0) if len(seen) else np.empty((0, 2))
         corners = np.concatenate([corners, must])

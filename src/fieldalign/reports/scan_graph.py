@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..clouds.cloud import PointCloud
 from ..fields.protocol import Floats
+from .model_scene import component_up
 from .plan import Plan, path_of
 
 _BACKDROP = 4000  # points of the model
@@ -31,7 +32,7 @@ def scan_graph(model: PointCloud, members: Sequence[int], names: Sequence[str], 
     """A component as SVG. model: its fused cloud, with the attribute "scan"; names: of all scans."""
     points, scans = np.asarray(model.points, float), np.asarray(model.attributes["scan"])
     middles = np.stack([_middle(points, scans, k) for k in members])
-    plan = Plan(points, middles, _BACKDROP)
+    plan = Plan(points, middles, _BACKDROP, component_up(model, members))
     nodes = dict(zip(members, plan.at(middles), strict=True))
     own = [edge for edge in edges if edge.i in nodes and edge.j in nodes]
     weak = sum(edge.kind != "strong" for edge in own)

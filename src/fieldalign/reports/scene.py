@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import base64
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..assembly.pair_result import PairResult
 from ..fields import PointField
 from ..fields.protocol import Floats
 from ..methods.pair import Pair
@@ -19,7 +17,7 @@ from ..prepared import PreparedCloud
 from ..result import RegistrationResult
 from ..scale import common_voxel
 from ..scaled import ScaledCloud
-from . import views
+from . import packing, views
 from .closeness import Closeness, closeness
 from .pose_forms import in_space
 
@@ -48,11 +46,12 @@ class Scene:
 
 
 def scene_of(
-    result: RegistrationResult | PairResult, source: PreparedCloud, target: PreparedCloud, most: int = MOST_POINTS,
-    with_pseudo: bool = True,
+    T_target_source: Floats, source: PreparedCloud, target: PreparedCloud, most: int = MOST_POINTS,
+    result: RegistrationResult | None = None,
 ) -> Scene:
-    """The scene of a result, of each cloud so many points; what the registration made of the clouds is used again."""
-    T = in_space(result.T_target_source)
+    """The scene of a pose, of each cloud so many points; what the registration made of the clouds is used again.
+    result: the one whose pseudo points are shown, too."""
+    T = in_space(T_target_source)
     size = size_of(T)
     as_large = source if np.isclose(size, 1, rtol=1e-12, atol=0) else ScaledCloud(source, size)
     rigid = T @ growth(1 / size)
@@ -64,35 +63,38 @@ def scene_of(
     )
     met = np.abs(np.concatenate([one.distance[one.meets] for one in near]))
     limit = max(float(np.percentile(met, _FULL)), 1e-12 * target.extent) if len(met) else voxel
-    pseudo, of = _pseudo_points(result, Pair(as_large, target, voxel), size) if with_pseudo else (None, "target")
+    pseudo, of = (None, "target") if result is None else _pseudo_points(result, Pair(as_large, target, voxel), size)
     return Scene(source, target, places, near, T, limit, voxel, pseudo, of)
 
 
-def viewer_data(scene: Scene, others: tuple[RegistrationResult, ...] = ()) -> dict[str, Any]:
-    """The scene in numbers and base64, about the middle of the target; others: poses that may be looked at, too."""
+def viewer_data(scene: Scene, others: Mapping[str, Floats] | None = None, name: str = "the result") -> dict[str, Any]:
+    """The scene in numbers and base64, about the middle of the target; name: of its pose; others: poses (4, 4) or
+    (3, 3) that may be looked at, too, by name."""
     middles = np.median(scene.places[0], axis=0), np.median(scene.places[1], axis=0)
     origin = middles[1]
-    up = views.level(scene.places[1], np.array([0.0, 0.0, 1.0]))
+    up = views.upright(scene.places[1])
     ahead = views.ahead(np.zeros(3) if scene.target.eye is None else scene.target.eye, scene.places[1], up)
     heights = np.concatenate([apply(scene.T, scene.places[0]) @ up, scene.places[1] @ up]) - origin @ up
-    ceiling = views.ceiling(heights)
-    clouds = {
-        name: _packed(places, near, scene.limit, middle, origin)
-        for name, places, near, middle in zip(("source", "target"), scene.places, scene.near, middles, strict=True)
-    }
-    poses = [scene.T, *(in_space(other.T_target_source) for other in others)]
-    packed = None if scene.pseudo is None else {"of": scene.pseudo_of, **_quantised(scene.pseudo, origin)}
-    return {
-        "clouds": clouds,
-        "motions": [_motion(T, middles[0], origin) for T in poses],
+    poses = {name: scene.T} | {name: in_space(T) for name, T in (others or {}).items()}
+    pseudo = None if scene.pseudo is None else {"of": scene.pseudo_of, **packing.quantised(scene.pseudo, origin)}
+    return packing.outlook(up, ahead, heights) | {
+        "clouds": {
+            name: _packed(places, near, scene.limit, origin)
+            for name, places, near in zip(("source", "target"), scene.places, scene.near, strict=True)
+        },
+        "motions": [{"name": name} | _motion(T, middles[0], origin) for name, T in poses.items()],
         "pivot": (middles[0] - origin).tolist(),
-        "pseudo": packed,
-        "up": up.tolist(),
-        "oblique": views.obliquely(up, ahead)[2].tolist(),
-        "side": (-ahead).tolist(),
-        "ceiling": ceiling if np.isfinite(ceiling) else None,
+        "pseudo": pseudo,
         "signed": scene.near[0].signed,
         "words": _words(scene),
+    }
+
+
+def _packed(places: Floats, near: Closeness, limit: float, origin: Floats) -> packing.Packed:
+    """A cloud, and how near it comes to the other."""
+    return packing.cloud(places, near.normal, origin) | {
+        "states": packing.as_base64(near.state),
+        "distances": packing.as_base64(np.rint(127 * np.clip(near.distance / limit, -1, 1)).astype(np.int8)),
     }
 
 
@@ -111,12 +113,10 @@ def _words(scene: Scene) -> dict[str, str]:
 def _drawn(cloud: PreparedCloud, most: int) -> Floats:
     """Some points of a cloud, the same ones each time, or places on a surface."""
     points = cloud.field.points if isinstance(cloud.field, PointField) else cloud.fine.points
-    if len(points) > most:
-        points = points[np.sort(np.random.default_rng(0).choice(len(points), most, replace=False))]
-    return np.ascontiguousarray(points, float)
+    return np.ascontiguousarray(points[packing.some(len(points), most)], float)
 
 
-def _pseudo_points(result: RegistrationResult | PairResult, pair: Pair, size: float) -> tuple[Floats | None, str]:
+def _pseudo_points(result: RegistrationResult, pair: Pair, size: float) -> tuple[Floats | None, str]:
     """The third set, in the frame of the cloud that it was drawn on, and which one that is."""
     if result.evidence is None:  # the paper's method
         return pair.target.last_pseudo_points, "target"
@@ -130,26 +130,3 @@ def _motion(T: Floats, pivot: Floats, origin: Floats) -> dict[str, Any]:
     size = size_of(T)
     rigid = T @ translation(pivot) @ growth(1 / size) @ translation(-pivot)
     return {"twist": log_motion(translation(-origin) @ rigid @ translation(origin)).tolist(), "growth": size}
-
-
-def _packed(places: Floats, near: Closeness, limit: float, middle: Floats, origin: Floats) -> dict[str, Any]:
-    """A cloud: coordinates in 16 bits, normals and distances in 8, and about how far its points lie apart."""
-    reach = float(np.mean((places - middle) ** 2))
-    return _quantised(places, origin) | {
-        "normals": _base64(np.rint(127 * near.normal).astype(np.int8)),
-        "states": _base64(near.state),
-        "distances": _base64(np.rint(127 * np.clip(near.distance / limit, -1, 1)).astype(np.int8)),
-        "spacing": float(np.sqrt(12 * reach / len(places))),
-    }
-
-
-def _quantised(places: Floats, origin: Floats) -> dict[str, Any]:
-    """Places (n, 3) as 16-bit steps from the middle of their bounds; a step is the same length along all axes."""
-    low, high = places.min(axis=0), places.max(axis=0)
-    middle, half = (low + high) / 2, max(float((high - low).max()) / 2, 1e-300)
-    steps = np.rint((places - middle) / half * 32767).astype("<i2")
-    return {"points": _base64(steps), "centre": (middle - origin).tolist(), "half": half}
-
-
-def _base64(array: NDArray[Any]) -> str:
-    return base64.b64encode(np.ascontiguousarray(array).tobytes()).decode("ascii")

@@ -1,8 +1,8 @@
-// A table that sorts by its columns, and shows the pair of a row: its picture, its verdict, its pose.
+// Tables that sort by their columns; that of pairs shows the pair of a row: its picture, its verdict, its pose.
 "use strict";
 (() => {
   const $ = (id) => document.getElementById(id);
-  const { pairs } = JSON.parse($("data").textContent);
+  const { pairs } = (globalThis.report ??= JSON.parse($("data").textContent));
   const body = $("pairs").tBodies[0];
   const calm = matchMedia("(prefers-reduced-motion: reduce)").matches;
 
@@ -25,6 +25,7 @@
   };
 
   const sort = (header) => {
+    const table = header.closest("table");
     const column = [...header.parentElement.cells].indexOf(header);
     const way = header.getAttribute("aria-sort") === "ascending" ? -1 : 1;
     for (const other of header.parentElement.cells) other.removeAttribute("aria-sort");
@@ -35,12 +36,20 @@
     const compare = (a, b) => (isNumber
       ? (value(a) === "") - (value(b) === "") || way * (value(a) - value(b))
       : way * value(a).localeCompare(value(b), undefined, { numeric: true }));
-    body.append(...[...body.rows].sort(compare));
+    table.tBodies[0].append(...[...table.tBodies[0].rows].sort(compare));
   };
 
-  $("pairs").tHead.addEventListener("click", (event) => {
-    const header = event.target.closest("th");
-    if (header) sort(header);
+  for (const table of document.querySelectorAll("table.sortable")) {
+    table.tHead.addEventListener("click", (event) => {
+      const header = event.target.closest("th");
+      if (header) sort(header);
+    });
+  }
+  // Only the rows of one word, such as a method.
+  $("only")?.addEventListener("change", ({ target }) => {
+    for (const row of body.rows) {
+      row.hidden = target.value !== "" && ![...row.cells].some((cell) => cell.dataset.value === target.value);
+    }
   });
   // Rows of the table, and lines of a graph.
   document.querySelector("main").addEventListener("click", (event) => {
