@@ -38,8 +38,7 @@ def write_assembly_report(
 
     The page shows each component in 3D, and from above with its scans and the pairs between them, a table of the pairs,
     those that are not believed and those that fit the poses of all worst first, each with both scans in 3D a click
-    away, how well
-    each scan is placed, and which are left out, and why.
+    away, how well each scan is placed, and which are left out, and why.
 
     assembly: of `fa.assemble`. clouds: as they were handed in there; they are read again for the pictures. path: ends
     in .html; it is replaced whole or not at all. names: of the clouds, where they are no paths. title: one line.

@@ -133,10 +133,10 @@ def _said(trial: _Trial) -> str:
 def _picture(trial: _Trial, clouds: Any, most: int) -> dict[str, Any]:
     """Both clouds before and after the pose that was found, and at the truth."""
     truth = trial.case.T_target_source
+    source, target = clouds(trial.case)
     if "error" in trial.row:
-        return viewer_data(scene_of(truth, *clouds(trial.case), most), name="the truth")
-    scene = scene_of(_pose(trial.row), *clouds(trial.case), most)
-    return viewer_data(scene, {"the truth": truth}, "as found")
+        return viewer_data(scene_of(truth, source, target, most), name="the truth")
+    return viewer_data(scene_of(_pose(trial.row), source, target, most), {"the truth": truth}, "as found")
 
 
 def _prepared(case: Case) -> tuple[PreparedCloud, PreparedCloud]:

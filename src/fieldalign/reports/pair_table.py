@@ -126,7 +126,9 @@ def table_beside_view(
     body = "".join(_row(number, row) for number, row in enumerate(rows))
     return f"""<div class="beside">
 <section aria-labelledby="list"><h3 id="list" class="unseen">All pairs</h3>
-{above}<div class="scroll"><table id="pairs" class="sortable"><thead><tr>{names}</tr></thead><tbody>{body}</tbody></table></div>
+{above}
+<div class="scroll"><table id="pairs" class="sortable"><thead><tr>{names}</tr></thead>
+<tbody>{body}</tbody></table></div>
 </section>
 <section id="shown" aria-labelledby="chosen" aria-live="polite"><h2 id="chosen"></h2><p id="said"></p>
 {viewer}
