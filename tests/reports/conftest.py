@@ -22,6 +22,26 @@ FLAGS = (
 )
 
 
+COUNT = """((name) => {
+  const canvas = document.getElementById(name);
+  const copy = new OffscreenCanvas(canvas.width, canvas.height).getContext("2d");
+  copy.drawImage(canvas, 0, 0);
+  const { data } = copy.getImageData(0, 0, canvas.width, canvas.height);
+  const found = { all: 0, orange: 0, blue: 0, green: 0, black: 0, sum: 0 };
+  for (let k = 0; k < data.length; k += 4) {
+    if (data[k + 3] < 200) continue;
+    const [r, g, b] = data.subarray(k, k + 3);
+    found.all++;
+    found.sum = (found.sum * 31 + r + 7 * g + 13 * b + k) % 1000003;
+    if (r > g + 40 && g > b + 20) found.orange++;
+    if (b > r + 60 && b > g + 25) found.blue++;
+    if (g > r + 60 && g > b + 20) found.green++;
+    if (r + g + b < 90) found.black++;
+  }
+  return found;
+})"""
+
+
 class Chromium:
     """One page of a browser. complaints: what it wrote to the console as errors or warnings, and what it threw."""
 
@@ -157,3 +177,15 @@ def chromium(tmp_path_factory):
     browser = Chromium(program, tmp_path_factory.mktemp("profile"))
     yield browser
     browser.close()
+
+
+@pytest.fixture(scope="session")
+def seen():
+    """seen(browser, canvas): how many pixels of a canvas are drawn on, in which colours, and a sum that tells pictures
+    apart."""
+
+    def count(browser, canvas="canvas"):
+        browser.settle()
+        return browser.run(f"{COUNT}({canvas!r})")
+
+    return count

@@ -312,26 +312,6 @@ def test_the_package_holds_what_a_page_is_made_of():
 
 # ---- In a real browser
 
-COUNT = """(() => {
-  const canvas = document.getElementById("canvas");
-  const copy = new OffscreenCanvas(canvas.width, canvas.height).getContext("2d");
-  copy.drawImage(canvas, 0, 0);
-  const { data } = copy.getImageData(0, 0, canvas.width, canvas.height);
-  const found = { all: 0, orange: 0, blue: 0, green: 0, black: 0, sum: 0 };
-  for (let k = 0; k < data.length; k += 4) {
-    if (data[k + 3] < 200) continue;
-    const [r, g, b] = data.subarray(k, k + 3);
-    found.all++;
-    found.sum = (found.sum * 31 + r + 7 * g + 13 * b + k) % 1000003;
-    if (r > g + 40 && g > b + 20) found.orange++;
-    if (b > r + 60 && b > g + 25) found.blue++;
-    if (g > r + 60 && g > b + 20) found.green++;
-    if (r + g + b < 90) found.black++;
-  }
-  return found;
-})()"""
-
-
 @pytest.fixture
 def blind(chromium):
     """A browser without WebGL."""
@@ -357,43 +337,38 @@ def browser(chromium, report):
     assert chromium.complaints == []
 
 
-def shown(browser):
-    browser.settle()
-    return browser.run(COUNT)
-
-
-def test_the_page_loads_and_shows_both_clouds(browser):
-    seen = shown(browser)
-    assert seen["orange"] > 500
-    assert seen["blue"] > 500
+def test_the_page_loads_and_shows_both_clouds(browser, seen):
+    found = seen(browser)
+    assert found["orange"] > 500
+    assert found["blue"] > 500
     assert browser.run("performance.getEntriesByType('resource').length") == 0
     assert browser.run("!document.querySelector('#viewer.off')")
 
 
-def test_colouring_by_agreement_and_by_distance(browser):
+def test_colouring_by_agreement_and_by_distance(browser, seen):
     browser.click("input[value=agreement]")
-    assert shown(browser)["green"] > 1000
+    assert seen(browser)["green"] > 1000
     assert browser.run("!document.querySelector('[data-legend=agreement]').hidden")
     assert browser.run("document.querySelector('[data-legend=cloud]').hidden")
     browser.click("input[value=distance]")
-    seen = shown(browser)
-    assert seen["green"] == 0
-    assert seen["all"] > 1000
+    found = seen(browser)
+    assert found["green"] == 0
+    assert found["all"] > 1000
 
 
-def test_the_slider_moves_the_source(browser):
-    end = shown(browser)
+def test_the_slider_moves_the_source(browser, seen):
+    end = seen(browser)
     browser.run("document.getElementById('between').focus()")
     browser.press("b")
     assert browser.run("document.getElementById('where').value") == "before"
-    begin = shown(browser)
+    begin = seen(browser)
     assert begin["sum"] != end["sum"]
     for _ in range(3):
         browser.press("ArrowRight")
     assert browser.run("document.getElementById('where').value") == "3 %"
-    assert shown(browser)["sum"] != begin["sum"]
+    assert seen(browser)["sum"] != begin["sum"]
     browser.press("a")
-    assert shown(browser)["sum"] == end["sum"]
+    assert seen(browser)["sum"] == end["sum"]
 
 
 def test_play_goes_from_before_to_after(browser):
@@ -402,40 +377,55 @@ def test_play_goes_from_before_to_after(browser):
     browser.wait_for("document.getElementById('where').value === 'after'")
 
 
-def test_clouds_and_pseudo_points_come_and_go(browser):
+def test_clouds_and_pseudo_points_come_and_go(browser, seen):
     browser.click("#show-source")
-    seen = shown(browser)
-    assert seen["orange"] == 0
-    assert seen["blue"] > 500
+    found = seen(browser)
+    assert found["orange"] == 0
+    assert found["blue"] > 500
     browser.click("#show-pseudo")
-    assert shown(browser)["black"] > 100
+    assert seen(browser)["black"] > 100
     browser.click("#show-source")
     browser.click("#show-target")
-    assert shown(browser)["orange"] > 500
+    assert seen(browser)["orange"] > 500
 
 
-def test_views_and_the_keyboard_turn_the_camera(browser):
-    pictures = [shown(browser)["sum"]]
+def test_views_and_the_keyboard_turn_the_camera(browser, seen):
+    pictures = [seen(browser)["sum"]]
     for view in ("above", "side"):
         browser.click(f"[data-view={view}]")
-        pictures.append(shown(browser)["sum"])
+        pictures.append(seen(browser)["sum"])
     browser.run("document.getElementById('canvas').focus()")
     for key in ("ArrowLeft", "ArrowUp", "+"):
         browser.press(key)
-        pictures.append(shown(browser)["sum"])
+        pictures.append(seen(browser)["sum"])
     assert len(set(pictures)) == len(pictures)
     browser.press("1")
-    assert shown(browser)["sum"] == pictures[0]
-    assert shown(browser)["all"] > 1000
+    assert seen(browser)["sum"] == pictures[0]
+    assert seen(browser)["all"] > 1000
 
 
-def test_light_and_dark(browser, report):
+def test_another_axis_can_be_turned_upwards(browser, seen):
+    first = seen(browser)["sum"]
+    label = "document.querySelector('[data-up]').textContent"
+    browser.click("[data-up]")
+    assert browser.run(label).startswith("Up: ")
+    pictures, names = {seen(browser)["sum"]}, {browser.run(label)}
+    while browser.run(label) != "Up: as found":
+        browser.press("u")
+        pictures.add(seen(browser)["sum"])
+        names.add(browser.run(label))
+    assert len(pictures) == len(names) >= 5
+    assert seen(browser)["sum"] == first
+    assert seen(browser)["all"] > 1000
+
+
+def test_light_and_dark(browser, report, seen):
     background = "getComputedStyle(document.body).backgroundColor"
     light = browser.run(background)
-    before = shown(browser)["sum"]
+    before = seen(browser)["sum"]
     browser.click("#theme")
     assert browser.run(background) != light
-    assert shown(browser)["sum"] != before
+    assert seen(browser)["sum"] != before
     dark = browser.run(background)
     browser.open(report, dark=True)
     assert browser.run(background) == dark
@@ -459,16 +449,16 @@ def test_the_focus_can_be_seen(browser):
     assert browser.run("getComputedStyle(document.activeElement).outlineStyle") == "solid"
 
 
-def test_a_phone_shows_all_of_it(browser, report):
+def test_a_phone_shows_all_of_it(browser, report, seen):
     browser.open(report, width=390, height=844)
     assert browser.run("document.documentElement.scrollWidth") <= 390
-    assert shown(browser)["all"] > 500
+    assert seen(browser)["all"] > 500
 
 
-def test_a_scan_named_as_a_script_does_nothing(browser, clouds, result, tmp_path):
+def test_a_scan_named_as_a_script_does_nothing(browser, clouds, result, tmp_path, seen):
     browser.open(write_report(result, *clouds[:2], tmp_path / "evil.html", EVIL))
     assert browser.run("typeof hacked") == "undefined"
-    assert shown(browser)["all"] > 500
+    assert seen(browser)["all"] > 500
     browser.run("document.body.insertAdjacentHTML('beforeend', '<b onclick=\"hacked = 1\" id=\"trap\">x</b>')")
     browser.run("document.getElementById('trap').click()")
     assert browser.run("typeof hacked") == "undefined"
@@ -477,7 +467,7 @@ def test_a_scan_named_as_a_script_does_nothing(browser, clouds, result, tmp_path
     browser.complaints.clear()
 
 
-def test_alternatives_can_be_looked_at(chromium, tmp_path):
+def test_alternatives_can_be_looked_at(chromium, tmp_path, seen):
     rng = np.random.default_rng(0)
     points = rng.uniform(-1, 1, (6000, 3))
     face = rng.integers(0, 3, len(points))
@@ -490,8 +480,8 @@ def test_alternatives_can_be_looked_at(chromium, tmp_path):
     end = after(data, unpacked(data["clouds"]["source"]), motion=1) + np.median(points[3000:], axis=0)
     assert np.allclose(end, apply(result.alternatives[0].T_target_source, points[:3000]), atol=1e-3)
     chromium.open(path)
-    first = shown(chromium)["sum"]
+    first = seen(chromium)["sum"]
     chromium.run("document.getElementById('pose').focus()")
     chromium.run("const p = document.getElementById('pose'); p.value = '1'; p.dispatchEvent(new Event('change'))")
-    assert shown(chromium)["sum"] != first
+    assert seen(chromium)["sum"] != first
     assert chromium.complaints == []

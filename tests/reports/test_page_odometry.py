@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import re
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 import fieldalign as fa
 from fieldalign.motions import translation
 from fieldalign.reports import write_odometry_report
+from fieldalign.reports.packing import beads
 from fieldalign.reports.page_odometry import Stretch, _stretches
 from fieldalign.reports.plan import WIDE, Plan
 
@@ -82,6 +84,39 @@ def test_a_plan_keeps_shapes_and_holds_what_it_must():
     assert b[0] < c[0]
     assert b[1] < a[1]  # y of the world is up
     assert 500 < plan.backdrop.count("M") <= 1700
+
+
+def test_beads_follow_a_way_at_even_distances():
+    way = np.array([[0.0, 0, 0], [1, 0, 0], [1, 0.5, 0]])
+    packed = beads([way], 0.1, np.zeros(3))
+    steps = np.frombuffer(base64.b64decode(packed["points"]), "<i2").reshape(-1, 3)
+    places = np.array(packed["centre"]) + packed["half"] * steps / 32767
+    assert np.allclose(places[[0, -1]], way[[0, -1]], atol=1e-4)
+    apart = np.linalg.norm(np.diff(places, axis=0), axis=1)
+    assert apart.max() < 0.1 + 1e-4
+    assert len(places) == 17
+
+
+def test_the_drive_in_3d_shows_map_way_truth_and_what_was_not_tracked(chromium, report, seen):
+    chromium.open(report)
+    chromium.click("[name=tint][value=plain]")
+    every = seen(chromium, "model-canvas")
+    assert every["orange"] > 200
+    assert every["all"] > 2000
+    assert chromium.run("[...document.querySelectorAll('#see label span')].map(e => e.textContent)")[:4] == [
+        "start", "not tracked", "trajectory", "truth"]
+    chromium.click("#see-way")
+    without = seen(chromium, "model-canvas")
+    assert without["orange"] == 0
+    assert without["blue"] > 20
+    chromium.click("#see-truth")
+    assert seen(chromium, "model-canvas")["blue"] == 0
+    lost = seen(chromium, "model-canvas")["sum"]
+    chromium.click("#see-lost")
+    assert seen(chromium, "model-canvas")["sum"] != lost
+    chromium.press("c")
+    assert chromium.run("document.querySelector('[name=tint][value=height]').checked")
+    assert chromium.complaints == []
 
 
 def test_the_page_loads_and_fits_a_phone(chromium, report):

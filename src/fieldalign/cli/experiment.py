@@ -65,21 +65,21 @@ def command(
             Path(run_folder) if run_folder else None, tell,
         ))
         if page is not None:
-            _write_page(report, page, name, lambda finished, of: tell("drawing", finished, of))
+            _write_page(report, page, lambda finished, of: tell("drawing", finished, of))
     click.echo(report.text)
     for file in report.files:
         click.echo(f"wrote {file}")
     return 0
 
 
-def _write_page(report: Report, path: str, name: str, progress: Callable[[int, int], None]) -> None:
+def _write_page(report: Report, path: str, progress: Callable[[int, int], None]) -> None:
     """Of registrations a table; of a drive the first method's trajectory beside the truth."""
     from ..reports import write_experiment_report, write_odometry_report
 
     if report.results:
-        write_experiment_report(report.results, path, progress=progress)
+        write_experiment_report(report.results, path, report.title, progress)
     for title, evaluation in list(report.drives.items())[:1]:
-        write_odometry_report(evaluation.trajectory, path, evaluation=evaluation, title=f"{name}: {title}")
+        write_odometry_report(evaluation.trajectory, path, evaluation=evaluation, title=f"{report.title}, {title}")
 
 
 def _folder(output: str) -> Path:

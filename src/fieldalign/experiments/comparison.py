@@ -65,7 +65,7 @@ class Comparison:
         if self.draw is not None:
             self.draw(measured, path.with_suffix(".png"))
             files.append(path.with_suffix(".png"))
-        return Report(text, files, [measured])
+        return Report(text, files, self.title, [measured])
 
     def measure(self, request: Request) -> Results:
         """Every case by every method; what the run folder holds is not done again."""

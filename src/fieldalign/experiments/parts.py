@@ -49,7 +49,7 @@ class Parts:
             raise left_out[0]
         below = [self.beside, *(f"Left out: {error}." for error in left_out)]
         files.append(write_text("\n\n".join([*pages, *below]) + "\n", request.output / f"{self.name}.md"))
-        return Report("\n\n".join([*texts, *below]), files, every)
+        return Report("\n\n".join([*texts, *below]), files, self.title, every)
 
     def _asked(self, request: Request) -> list[tuple[Comparison, Request]]:
         """What each part is asked: for those of the columns that it has, and for a record of its own; without those

@@ -46,10 +46,12 @@ class Request:
 @dataclass(frozen=True)
 class Report:
     """What an experiment answers: a text for the terminal, the files that it has written, and what a page of it shows:
-    the results of its registrations, part by part, or the trajectories beside the truth, by the names of their methods.
+    the results of its registrations, part by part, or the trajectories beside the truth, by the names of their methods;
+    title: of the experiment.
     """
 
     text: str
     files: list[Path]
+    title: str = ""
     results: Sequence[Results] = ()
     drives: Mapping[str, Evaluation] = field(default_factory=dict)

@@ -79,9 +79,10 @@ class Shelf:
         return self._clouds[key]
 
 
-def table_data(rows: Sequence[Row], progress: Progress | None, most: int = _PICTURES) -> dict[str, Any]:
-    """What the scripts need: a scene for each of the first rows, and what a click on each row shows."""
-    of = min(len(rows), most)
+def table_data(rows: Sequence[Row], progress: Progress | None, most: int | None = None) -> dict[str, Any]:
+    """What the scripts need: a scene for each of the first rows, and what a click on each row shows. most: so many
+    scenes at most; None: 500."""
+    of = min(len(rows), _PICTURES if most is None else most)
     points = int(np.clip(_ROOM / (2 * max(of, 1)), _FEWEST, _MOST))
     scenes: list[dict[str, Any]] = []
     pairs = []
@@ -119,10 +120,10 @@ def table_beside_view(
     rows: Sequence[Row], columns: Sequence[str], data: dict[str, Any], words: Sequence[str] = (), above: str = ""
 ) -> str:
     """The table, and beside it the pair that is chosen. columns: the names of those of numbers; words: of those of
-    words; above: HTML that stands above the table."""
+    words, the first of which stand before, the others behind; above: HTML that stands above the table."""
     viewer = pair_viewer() if data["scenes"] else ""
-    names = "".join(header(name, "") for name in ("pair", "verdict", *words))
-    names += "".join(header(name, "number") for name in columns)
+    names = "".join(header(name, "") for name in ("pair", "verdict", *words[:1]))
+    names += "".join(header(name, "number") for name in columns) + "".join(header(name, "") for name in words[1:])
     body = "".join(_row(number, row) for number, row in enumerate(rows))
     return f"""<div class="beside">
 <section aria-labelledby="list"><h3 id="list" class="unseen">All pairs</h3>
@@ -151,8 +152,8 @@ def number_cell(cell: tuple[float, str] | None) -> str:
 
 
 def _row(number: int, row: Row) -> str:
-    cells = "".join(f'<td data-value="{escape(tag)}">{escape(tag)}</td>' for tag in row.tags)
-    cells += "".join(map(number_cell, row.numbers))
+    words = [f'<td class="word" data-value="{escape(tag)}">{escape(tag)}</td>' for tag in row.tags]
+    cells = "".join([*words[:1], *map(number_cell, row.numbers), *words[1:]])
     name, word, mark = escape(row.name), escape(row.verdict), "good" if row.good else "bad"
     return (
         f'<tr data-pair="{number}"><th scope="row" data-value="{name}">'

@@ -23,6 +23,7 @@ _ENOUGH = 5000  # points for a histogram of heights
 # Steps of the search for the level, as tangents, each with the thickness of a layer as a share of the cloud's
 # size: a floor of that size fills one layer once the direction is right to about one step.
 _STEPS = ((0.1, 0.04), (0.03, 0.02), (0.01, 0.006))
+_TELLS = 1.25  # times as crowded as along the direction at hand: less is no layer, but a cloud seen along its length
 _LAYERS = 50
 _CEILING = 0.05  # share of the points in one layer of fifty: more than twice what walls put there
 _ELEVATION = np.radians(38)  # of the oblique view: enough to see the floor, little enough to see heights
@@ -63,7 +64,8 @@ def _upward_of_camera(points: Array) -> Array:
 def level(points: Array, up: Array) -> Array:
     """The unit (3,), within 20 degrees or so of `up`, along which points (N, 3) lie most in few thin layers.
 
-    Floors, ceilings and streets are such layers, so this is the vertical even where the sensor was tilted.
+    Floors, ceilings and streets are such layers, so this is the vertical even where the sensor was tilted. Where no
+    direction stands out, it is `up` itself.
     """
     sample = points[:: max(1, len(points) // _ENOUGH)]
     size = float(np.linalg.norm(np.std(sample, axis=0)))
@@ -72,7 +74,9 @@ def level(points: Array, up: Array) -> Array:
         tries = _around(best, step)
         heights = (sample - sample[0]) @ tries.T
         layers = np.floor(heights / max(thickness * size, 1e-300))
-        best = tries[np.argmax([_crowding(column) for column in layers.T])]
+        crowding = np.array([_crowding(column) for column in layers.T])
+        if crowding.max() > _TELLS * crowding[len(tries) // 2]:
+            best = tries[np.argmax(crowding)]
     return best
 
 

@@ -130,7 +130,7 @@ def efficiency(request: Request) -> Report:
     return Report(text, [
         write_json(found, path.with_suffix(".json")),
         write_text(page(head, text, len(by_threads[1].cases)), path.with_suffix(".md")), path.with_suffix(".png"),
-    ], [by_threads[1]])
+    ], _TIME.title, [by_threads[1]])
 
 
 def _grown(request: Request) -> Iterator[tuple[int, Results]]:

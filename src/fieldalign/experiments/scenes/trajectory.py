@@ -156,7 +156,7 @@ def _report(
     files = [results.write_json(head | {"methods": found}, path.with_suffix(".json")),
              write_text(results.page(head, text, len(drive)), path.with_suffix(".md"))]
     drives = {TITLES[name]: evaluation for name, evaluation in evaluations.items()}
-    return Report(text, files + _picture(path.with_suffix(".png"), evaluations), drives=drives)
+    return Report(text, files + _picture(path.with_suffix(".png"), evaluations), TITLE, drives=drives)
 
 
 def _table(drive: KittiSequence, evaluations: dict[str, Evaluation], costs: dict[str, float]) -> str:
