@@ -46,6 +46,28 @@ def test_small_set_in_its_published_layout(name, small, tmp_path, monkeypatch):
     assert (tmp_path / f"{name}.png").is_file() == (name != "modelnet40")
 
 
+def test_a_page_of_an_experiment(small, tmp_path):
+    page = tmp_path / "page.html"
+    status, found = experiment("modelnet40", small, tmp_path, "--columns", "paper", "--report", page)
+    assert status == 0
+    text = page.read_text("utf-8")
+    assert text.count("<tr data-pair") == len(found["rows"]) == 4
+    assert f"<h1>{found['title']}</h1>" in text
+    assert text.count('"name":"the truth"') == 4
+
+
+@pytest.mark.parametrize(("name", "page", "said"), [
+    ("pseudo-sets", "page.html", "pseudo-sets is a picture"), ("noise", "page.png", "must end in .html"),
+])
+def test_a_page_that_cannot_be_is_refused_before_any_work(name, page, said, small, tmp_path, capsys):
+    arguments = ["--data", str(small), "--output", str(tmp_path / "out"), "--report", str(tmp_path / page)]
+    with pytest.raises(SystemExit) as ended:
+        main(["experiment", name, *arguments])
+    assert ended.value.code == 1
+    assert said in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
 def test_modelnet40_takes_both_splits_and_both_sets_of_motions(small, tmp_path):
     _, found = experiment("modelnet40", small, tmp_path, "--columns", "paper")
     assert [(case["name"].split()[0], case["group"]) for case in found["cases"]] == [

@@ -218,8 +218,9 @@ def test_a_trajectory_goes_on_from_its_steps(experiment, streets):
     record = output / "kitti-trajectory.run" / "record.jsonl"
     lines = record.read_text().splitlines()
     assert len(lines) == 1 + 3
-    status, _, _ = experiment("kitti-trajectory", data, "--columns", "paper")
+    status, _, _ = experiment("kitti-trajectory", data, "--columns", "paper", "--report", output / "drive.html")
     assert status == 0
+    assert "the paper&#x27;s method, scan to scan</h1>" in (output / "drive.html").read_text("utf-8")
     assert record.read_text().splitlines()[:4] == lines
     assert len(record.read_text().splitlines()) == 1 + 5
 
@@ -244,8 +245,9 @@ def test_the_rows_of_the_ablation():
 
 
 def test_the_ablation(experiment, indoor):
-    status, said, output = experiment("ablation", indoor, "--limit", 2)
+    status, said, output = experiment("ablation", indoor, "--limit", 2, "--report", indoor / "page.html")
     assert status == 0, said
+    assert (indoor / "page.html").read_text("utf-8").count('class="part"') == 1
     found = read(output / "ablation-3dmatch.json")
     assert list(found["methods"]) == [*(f"row-{number}" for number in range(1, 9)), "default", "default-any-pose"]
     assert measures_of(found)["default"]["success"]["share"] == 1

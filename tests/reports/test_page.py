@@ -404,6 +404,18 @@ def test_views_and_the_keyboard_turn_the_camera(browser, seen):
     assert seen(browser)["all"] > 1000
 
 
+def test_a_finger_turns_the_camera(browser, report, seen):
+    browser.open(report, width=390, height=844)
+    before = seen(browser)["sum"]
+    box = browser.run("(b => [b.x + b.width / 2, b.y + b.height / 2])(document.querySelector('#canvas')."
+                      "getBoundingClientRect())")
+    for kind, shift in (("touchStart", 0), ("touchMove", 30), ("touchMove", 80)):
+        browser.call("Input.dispatchTouchEvent", type=kind, touchPoints=[{"x": box[0] + shift, "y": box[1]}])
+    browser.call("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
+    assert seen(browser)["sum"] != before
+    assert seen(browser)["all"] > 500
+
+
 def test_another_axis_can_be_turned_upwards(browser, seen):
     first = seen(browser)["sum"]
     label = "document.querySelector('[data-up]').textContent"

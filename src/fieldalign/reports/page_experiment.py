@@ -87,7 +87,7 @@ def write_experiment_report(
     body = f"""{head(name, "experiment report", "results")}
 <main class="wide" id="results">
 {facts(_figures(trials))}
-{"".join(map(_methods, results))}
+<section class="columns" aria-label="Methods">{"".join(map(_methods, results))}</section>
 {table_beside_view(rows, _COLUMNS, data, words, _above(trials))}
 </main>
 {foot(in_3d=bool(data["scenes"]))}"""
@@ -161,10 +161,10 @@ def _methods(results: Results) -> str:
     names = header("method", "") + "".join(header(name, "number") for name in _MEASURES)
     rows = "".join(map(partial(_method, results), results.titles))
     protocol = "".join(f"<li>{escape(sentence)}</li>" for sentence in results.head.get("protocol", ()))
-    return f"""<section class="part"><figure><h3>{escape(results.head["title"])}</h3>
+    return f"""<figure class="part"><h3>{escape(results.head["title"])}</h3>
 <div class="scroll"><table class="sortable"><thead><tr>{names}</tr></thead><tbody>{rows}</tbody></table></div>
 <figcaption>Right is within {degrees:g}° and {length:g} of the truth{_modulo(results)}; medians of the errors and of the
-time. <details><summary>What was done</summary><ul>{protocol}</ul></details></figcaption></figure></section>"""
+time. <details><summary>What was done</summary><ul>{protocol}</ul></details></figcaption></figure>"""
 
 
 def _modulo(results: Results) -> str:

@@ -99,7 +99,7 @@ def _stage(canvas: str, label: str, keys: str) -> str:
 <canvas id="{canvas}" tabindex="0" role="img" aria-label="{escape(label)}" aria-describedby="{keys}"></canvas>
 <p class="no-view">This browser shows no 3D here (WebGL is off). All else on this page stands.</p>
 <div class="views" role="group" aria-label="Look from">{buttons}<button type="button" data-up
-aria-label="Turn another axis upwards">Up</button></div>
+aria-label="Up: turn another axis upwards">Up</button></div>
 </div>"""
 
 

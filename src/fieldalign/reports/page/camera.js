@@ -24,6 +24,7 @@ const cameraOn = (stage, framed) => {
   let gaze = null; // from what is looked at to the camera
   let radius = 1; // about how far all reaches, where the camera was set up last
   let follows = true; // until somebody takes hold of the camera
+  let fitted = ""; // the size that the picture has
   let witnesses = new Map();
 
   const some = ({ object }) => {
@@ -71,7 +72,9 @@ const cameraOn = (stage, framed) => {
 
   const nextUp = () => {
     ups.push(ups.shift());
-    root.querySelector("[data-up]").textContent = `Up: ${ups[0][0]}`;
+    const button = root.querySelector("[data-up]");
+    button.textContent = `Up: ${ups[0][0]}`;
+    button.setAttribute("aria-label", `Up: ${ups[0][0]}; turn another axis upwards`);
     raise();
     frame();
     stage.draw();
@@ -144,8 +147,11 @@ const cameraOn = (stage, framed) => {
 
   const resize = () => {
     const { clientWidth: width, clientHeight: height } = canvas;
-    if (!width || !height) return;
-    renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    const ratio = Math.min(devicePixelRatio, 2);
+    const size = [width, height, ratio].join();
+    if (!width || !height || size === fitted) return;
+    fitted = size;
+    renderer.setPixelRatio(ratio);
     renderer.setSize(width, height, false);
     camera.aspect = width / height;
     shared.scale.value = renderer.domElement.height / 2 / steep;

@@ -161,6 +161,6 @@
     atHand = stage;
     load(event.detail);
   });
-  load(0);
+  if (!$("pairs")) load(0); // where there is a table, it chooses
   camera.resize();
 })();

@@ -121,6 +121,7 @@ const stageIn = (root) => {
       waiting = true;
       requestAnimationFrame(() => {
         waiting = false;
+        if (!layers.size) return;
         stage.beforeDrawing();
         renderer.render(scene, stage.camera);
       });
