@@ -65,6 +65,13 @@ def test_only_the_weakest_of_many_have_pictures(monkeypatch, results, pairs, tmp
     assert asked == [(0, 2), (1, 2)]
 
 
+def test_a_table_of_very_many_holds_the_weakest(monkeypatch, results, pairs, tmp_path):
+    monkeypatch.setattr(pair_table, "_ROWS", 2)
+    path = write_batch_report(results, pairs, tmp_path / "first.html")
+    assert len(data_of(path)["pairs"]) == 2
+    assert "The first 2 of 3." in path.read_text("utf-8")
+
+
 def test_clouds_that_are_gone_leave_their_rows(results, pairs, tmp_path):
     gone = [(str(tmp_path / "gone.npy"), target) for _, target in pairs]
     path = write_batch_report(results, gone, tmp_path / "gone.html")

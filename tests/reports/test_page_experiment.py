@@ -13,7 +13,7 @@ import fieldalign as fa
 from fieldalign.experiments.case import Case, Moved
 from fieldalign.experiments.results import Results
 from fieldalign.motions import exp_twist, translation
-from fieldalign.reports import page_experiment, write_experiment_report
+from fieldalign.reports import page_experiment, pair_table, write_experiment_report
 
 T = exp_twist(np.array([0.2, -0.1, 0.4, 0.3, 0.2, -0.4]))
 EVIL = "</td></script><script>hacked = 1</script>"
@@ -87,13 +87,13 @@ def test_symmetry_counts_where_there_may_be_some(results, tmp_path):
 
 def test_only_the_worst_of_many_have_pictures_and_rows(monkeypatch, results, tmp_path):
     monkeypatch.setattr(page_experiment, "_PICTURES", 2)
-    monkeypatch.setattr(page_experiment, "_TOLD", 4)
+    monkeypatch.setattr(pair_table, "_ROWS", 4)
     asked = []
     path = write_experiment_report(
         [results], tmp_path / "few.html", progress=lambda done, of: asked.append((done, of))
     )
     assert [pair["scene"] for pair in data_of(path)["pairs"]] == [0, 1, None, None]
-    assert "The worst 4 of 6." in path.read_text("utf-8")
+    assert "The first 4 of 6." in path.read_text("utf-8")
     assert asked == [(0, 2), (1, 2)]
 
 

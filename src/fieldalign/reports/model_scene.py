@@ -13,7 +13,7 @@ from ..fields import PointField
 from ..fields.protocol import Floats
 from . import packing, views
 
-_POINTS = 200_000   # of all components together, or of a map: 3 MB
+_POINTS = 150_000   # of all components together, or of a map: 2 MB
 _LARGE = 1.4         # times as far as they lie apart
 _FINE = 600         # beads side by side along all that is shown
 _MOST_BEADS = 20_000

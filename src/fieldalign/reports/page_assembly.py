@@ -17,7 +17,7 @@ from ..motions import angles_between, apply, inverse
 from ..prepare import CloudLike
 from .model_scene import component_models
 from .page import Page, checked_page_path, facts, foot, head, write_page
-from .pair_table import Progress, Row, Shelf, strength, table_beside_view, table_data, table_scripts
+from .pair_table import Progress, Row, Shelf, strength, table_beside_view, table_data, table_scripts, worst
 from .scan_graph import Edge, scan_graph
 from .viewer import MODEL_SCRIPTS, model_viewer
 
@@ -55,10 +55,11 @@ def write_assembly_report(
     pairs += [(i, j, result, False) for i, j, result in assembly.doubted]
     pairs.sort(key=lambda pair: (pair[3], -_off(assembly, pair)[0]))
     shelf = Shelf()
-    rows = [_row(assembly, pair, known, clouds, shelf) for pair in pairs]
+    rows, which = worst([_row(assembly, pair, known, clouds, shelf) for pair in pairs])
     data = table_data(rows, progress) | {"models": component_models(assembly, known, _SHOWN)}
     name = title or f"{len(clouds)} scans"
-    body = _body(name, assembly, known, pairs, table_beside_view(rows, _COLUMNS, data) if rows else "")
+    table = table_beside_view(rows, _COLUMNS, data, above=which) if rows else ""
+    body = _body(name, assembly, known, pairs[: len(rows)], table)
     scripts = (MODEL_SCRIPTS if data["models"] else ()) + (table_scripts(data) if rows else ("page.js",))
     return write_page(Page(name, body, tuple(dict.fromkeys(scripts)), data), path)
 

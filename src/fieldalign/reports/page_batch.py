@@ -12,7 +12,7 @@ from ..assembly.pair_result import PairResult
 from ..errors import ArgumentError
 from ..verdict import Reason
 from .page import Page, checked_page_path, facts, foot, head, write_page
-from .pair_table import Progress, Row, Shelf, strength, table_beside_view, table_data, table_scripts
+from .pair_table import Progress, Row, Shelf, strength, table_beside_view, table_data, table_scripts, worst
 
 _COLUMNS = ("evidence", "overlap", "residual", "ms")
 
@@ -40,14 +40,14 @@ def write_batch_report(
         raise ArgumentError(f"pairs must be as many as the {len(results)} results, but are {len(pairs)}")
     order = sorted(range(len(results)), key=lambda k: (results[k].accepted, strength(results[k])))
     shelf = Shelf()
-    rows = [_row(results[k], pairs[k], shelf) for k in order]
+    rows, which = worst([_row(results[k], pairs[k], shelf) for k in order])
     data = table_data(rows, progress)
     name = title or f"{len(results)} pairs"
     counts = Counter(result.reason for result in results)
     body = f"""{head(name, "batch report", "pairs")}
 <main class="wide">
 {facts({_word(reason): str(counts[reason]) for reason in Reason if counts[reason]})}
-{table_beside_view(rows, _COLUMNS, data)}
+{table_beside_view(rows, _COLUMNS, data, above=which)}
 </main>
 {foot()}"""
     return write_page(Page(name, body, table_scripts(data), data), path)

@@ -19,7 +19,7 @@ from ..prepare import prepare_pair
 from ..prepared import PreparedCloud
 from ..threads import resolve_threads
 from .page import Page, checked_page_path, facts, foot, head, write_page
-from .pair_table import Progress, Row, header, number_cell, table_beside_view, table_data, table_scripts
+from .pair_table import Progress, Row, header, number_cell, table_beside_view, table_data, table_scripts, worst
 from .scene import scene_of, viewer_data
 
 if TYPE_CHECKING:
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from ..experiments.results import Results
 
 _PICTURES = 120  # of the worst; their clouds are made again
-_TOLD = 3000     # registrations in the table
 _KEPT = 8        # pairs of clouds that wait for the next method's picture
 _COLUMNS = ("off by", "rotation", "translation", "ms")
 _MEASURES = ("cases", "right", "no pose", "accepted", "of these wrong", "rotation", "translation", "CPU ms")
@@ -80,7 +79,7 @@ def write_experiment_report(
     trials.sort(key=lambda trial: (trial.kind, -trial.off, trial.case.name, trial.method))
     several = len(results) > 1
     clouds = lru_cache(_KEPT)(_prepared)
-    rows = [_row(trial, several, partial(_picture, trial, clouds)) for trial in trials[:_TOLD]]
+    rows, which = worst([_row(trial, several, partial(_picture, trial, clouds)) for trial in trials])
     data = table_data(rows, progress, _PICTURES)
     name = title or results[0].head["title"]
     words = ("method", "group", *(["part"] if several else []))
@@ -88,7 +87,7 @@ def write_experiment_report(
 <main class="wide" id="results">
 {facts(_figures(trials))}
 <section class="columns" aria-label="Methods">{"".join(map(_methods, results))}</section>
-{table_beside_view(rows, _COLUMNS, data, words, _above(trials))}
+{table_beside_view(rows, _COLUMNS, data, words, _above(trials, which))}
 </main>
 {foot(in_3d=bool(data["scenes"]))}"""
     return write_page(Page(name, body, table_scripts(data), data), path)
@@ -191,10 +190,9 @@ def _method(results: Results, method: str) -> str:
     return f'<tr><th scope="row" data-value="{title}">{title}</th>{"".join(map(number_cell, cells))}</tr>'
 
 
-def _above(trials: Sequence[_Trial]) -> str:
-    """Above the table: which method to show, and what the table leaves out."""
+def _above(trials: Sequence[_Trial], which: str) -> str:
+    """Above the table: which method to show, and which rows there are."""
     titles = dict.fromkeys(trial.results.titles[trial.method] for trial in trials)
     options = "".join(f"<option>{escape(title)}</option>" for title in titles)
-    more = f" The worst {_TOLD} of {len(trials)}." if len(trials) > _TOLD else ""
     return f"""<p class="choice"><label>Show <select id="only"><option value="">all methods</option>{options}</select>
-</label> <span>The worst first; off by: times what is allowed.{more}</span></p>"""
+</label> <span>The worst first; off by: times what is allowed. {which}</span></p>"""

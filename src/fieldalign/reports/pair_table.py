@@ -23,6 +23,7 @@ from .viewer import PAIR_SCRIPTS, pair_viewer
 Progress = Callable[[int, int], None]
 Picture = Callable[[int], dict[str, Any]]
 
+_ROWS = 4000           # of a table: 1 to 1.3 KB each
 _PICTURES = 500        # at most, those of the first rows
 _ROOM = 400_000        # points of all pictures together: 6 MB
 _FEWEST, _MOST = 400, 20_000  # points of a cloud in a picture
@@ -77,6 +78,11 @@ class Shelf:
                 self._clouds.pop(next(iter(self._clouds)))
             self._clouds[key] = prepare_named(cloud, "cloud", None, True)
         return self._clouds[key]
+
+
+def worst(rows: Sequence[Row]) -> tuple[Sequence[Row], str]:
+    """The first rows, as many as a page may hold, and a sentence where these are not all."""
+    return rows[:_ROWS], f"The first {_ROWS:,} of {len(rows):,}." if len(rows) > _ROWS else ""
 
 
 def table_data(rows: Sequence[Row], progress: Progress | None, most: int | None = None) -> dict[str, Any]:

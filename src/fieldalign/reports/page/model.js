@@ -25,7 +25,7 @@
     stage.canvas.setAttribute("aria-label", data.story);
     $("top-label").hidden = data.ceiling === null;
     $("see").hidden = data.ceiling === null && !$("model").querySelector("[data-layer]");
-    if (scans) choices();
+    $("scan")?.replaceChildren(new Option("all", ""), ...data.names.map((name, k) => new Option(name, k)));
     camera.aim(data);
     hideCeiling(!$("see-ceiling").checked);
     tint();
@@ -35,7 +35,10 @@
   // ---- Colours
 
   // The colour of a scan of this component, neither too light for a light page nor too dark for a dark one.
-  const hue = (k) => new THREE.Color().setHSL((0.07 + k * GOLDEN) % 1, 0.62, k % 2 ? 0.42 : 0.56);
+  const hue = (k) => {
+    const isDark = Number(getComputedStyle(document.body).color.match(/\d+/)[0]) > 128;
+    return new THREE.Color().setHSL((0.07 + k * GOLDEN) % 1, 0.62, (k % 2 ? 0.42 : 0.56) + (isDark ? 0.12 : 0));
+  };
 
   const byScan = () => {
     const chosen = $("scan").value;
@@ -61,6 +64,7 @@
   };
 
   const tint = () => {
+    if (scans) legend();
     const layer = layers.get("cloud");
     if (!layer) return;
     const { geometry } = layer.object;
@@ -75,14 +79,13 @@
       }
       geometry.setAttribute("tint", new THREE.BufferAttribute(bytes, 3, true));
     }
-    for (const legend of document.querySelectorAll("[data-tint]")) legend.hidden = legend.dataset.tint !== colouring;
+    for (const list of document.querySelectorAll("[data-tint]")) list.hidden = list.dataset.tint !== colouring;
     if ($("scan-label")) $("scan-label").hidden = colouring !== "scan";
     stage.draw();
   };
 
-  // The scans of this component, to be chosen, and those that the legend has room for.
-  const choices = () => {
-    $("scan").replaceChildren(new Option("all", ""), ...data.names.map((name, k) => new Option(name, k)));
+  // The scans that the legend has room for.
+  const legend = () => {
     $("scans").replaceChildren(...(data.names.length > TOLD ? [] : data.names.map((name, k) => {
       const item = document.createElement("li");
       const swatch = document.createElement("i");

@@ -53,7 +53,7 @@ const stageIn = (root) => {
   const canvas = root.querySelector("canvas");
   let renderer;
   try {
-    renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true, preserveDrawingBuffer: true });
+    renderer = new THREE.WebGLRenderer({ canvas, antialias: false, alpha: true, preserveDrawingBuffer: true });
   } catch {
     root.classList.add("off");
     return null;
