@@ -6,10 +6,12 @@ import base64
 import fcntl
 import json
 import os
+import re
 import select
 import shutil
 import subprocess
 import time
+from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
@@ -22,6 +24,7 @@ FLAGS = (
 )
 
 
+VOID = {"meta", "link", "input", "img", "br"}
 COUNT = """((name) => {
   const canvas = document.getElementById(name);
   const copy = new OffscreenCanvas(canvas.width, canvas.height).getContext("2d");
@@ -40,6 +43,36 @@ COUNT = """((name) => {
   }
   return found;
 })"""
+
+
+class Reader(HTMLParser):
+    """What a page holds, as a browser would read it: elements with their attributes, and the text of some."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(convert_charrefs=True)
+        self.elements, self.texts, self._open = [], {}, []
+        self.feed(text)
+        self.close()
+        assert not self._open, f"never closed: {self._open}"
+
+    def handle_starttag(self, tag, attrs):
+        self.elements.append((tag, dict(attrs)))
+        if tag not in VOID:
+            self._open.append(tag)
+            self.texts.setdefault(tag, []).append("")
+
+    def handle_startendtag(self, tag, attrs):
+        self.elements.append((tag, dict(attrs)))
+
+    def handle_endtag(self, tag):
+        assert self._open.pop() == tag
+
+    def handle_data(self, data):
+        if self._open:
+            self.texts[self._open[-1]][-1] += data
+
+    def values(self, attribute):
+        return [attrs[attribute] for _, attrs in self.elements if attribute in attrs]
 
 
 class Chromium:
@@ -189,3 +222,40 @@ def seen():
         return browser.run(f"{COUNT}({canvas!r})")
 
     return count
+
+
+@pytest.fixture(scope="session")
+def reader():
+    """The class Reader."""
+    return Reader
+
+
+@pytest.fixture(scope="session")
+def sound():
+    """sound(path): that a page is well formed, names what it refers to, has a name for every control and picture, and
+    asks nothing of a network."""
+
+    def check(path):
+        text = path.read_text("utf-8")
+        page = Reader(text)
+        ids = page.values("id")
+        assert len(ids) == len(set(ids))
+        for attribute in ("for", "aria-controls", "aria-labelledby", "aria-describedby", "data-of"):
+            assert set(page.values(attribute)) <= set(ids), attribute
+        within = re.findall(r'<label[^>]*>[^<]*<(?:input|select)[^>]*id="([^"]+)"', text)
+        labelled = {*page.values("for"), *within}
+        for tag, attrs in page.elements:
+            if tag in ("input", "select") and attrs.get("type") != "radio":
+                assert attrs["id"] in labelled or "aria-label" in attrs
+            if tag == "canvas" or (tag == "svg" and "aria-hidden" not in attrs):
+                assert attrs["role"] == "img"
+                assert attrs["aria-label"]
+            assert not [name for name in attrs if name.startswith("on") or name in ("src", "style")]
+        assert all(button.strip() for button in page.texts["button"])
+        assert {link[0] for link in page.values("href") if link != "data:,"} == {"#"}
+        policy = next(attrs["content"] for _, attrs in page.elements if "http-equiv" in attrs)
+        assert policy.startswith("default-src 'none'; ")
+        assert "unsafe" not in policy
+        assert "http" not in policy
+
+    return check

@@ -47,6 +47,10 @@ def rows_of(path):
     return re.findall(r'<tr data-pair="\d+"><th scope="row" data-value="([^"]*)">', path.read_text("utf-8"))
 
 
+def test_the_page_is_sound(report, sound):
+    sound(report)
+
+
 def test_the_page_holds_every_pair_scan_and_reason(report, assembly):
     text = report.read_text("utf-8")
     assert len(rows_of(report)) == len(assembly.edges) + len(assembly.doubted) == 3

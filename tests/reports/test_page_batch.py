@@ -42,6 +42,10 @@ def data_of(path):
     return json.loads(found[1])
 
 
+def test_the_page_is_sound(report, sound):
+    sound(report)
+
+
 def test_what_failed_comes_first_and_has_no_picture(report, results):
     data = data_of(report)
     assert [pair["scene"] is None for pair in data["pairs"]] == [True, False, False]

@@ -55,6 +55,10 @@ def words_of(path):
     return re.findall(r'<span class="mark">([^<]*)</span>', path.read_text("utf-8"))
 
 
+def test_the_page_is_sound(report, sound):
+    sound(report)
+
+
 def test_the_worst_comes_first(report):
     assert words_of(report) == ["wrong, yet accepted", "no pose", "wrong", "right", "right", "right"]
     data = data_of(report)

@@ -38,6 +38,10 @@ def report(drive, tmp_path_factory):
     )
 
 
+def test_the_page_is_sound(report, sound):
+    sound(report)
+
+
 def test_stretches_are_runs_that_were_not_tracked():
     assert _stretches([T, D, D, L, T, L]) == [Stretch(1, 2, D), Stretch(3, 3, L), Stretch(5, 5, L)]
     assert _stretches([]) == []

@@ -67,7 +67,7 @@ def command(
         if page is not None:
             _write_page(report, page, lambda finished, of: tell("drawing", finished, of))
     click.echo(report.text)
-    for file in report.files:
+    for file in [*report.files, *([page] if page is not None and (report.results or report.drives) else [])]:
         click.echo(f"wrote {file}")
     return 0
 
