@@ -5,7 +5,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 SOURCES := $(shell find src cpp -name '*.py' -o -name '*.hpp' -o -name '*.cpp' -o -name '*.pyi') CMakeLists.txt pyproject.toml
 
-.PHONY: demo test lint bench-paper bench-any-pose bench-verdict bench-fields bench-assemble bench-odometry experiments wheels clean
+.PHONY: demo test docs lint bench-paper bench-any-pose bench-verdict bench-fields bench-assemble bench-odometry experiments wheels clean
 
 demo: $(VENV)/.installed-viz      ## simulate two scans of a room, register them, compare with the truth
 	$(BIN)/fieldalign demo --output demo
@@ -14,6 +14,10 @@ test: $(VENV)/.installed-test     ## lint, types, and the whole test suite
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/pytest
+
+docs: $(VENV)/.installed-docs     ## these pages and the API reference as a site, in build/docs
+	$(BIN)/python -m sphinx -W --keep-going -q -E -d build/docs-cache docs build/docs
+	@echo "open build/docs/index.html"
 
 bench-paper: $(VENV)/.installed-viz  ## the figures of the paper's method; needs ../shared/data or $FIELDALIGN_DATA
 	$(BIN)/python benchmarks/paper.py --output docs/benchmarks

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-NEEDED = {"neural_field": "torch"}  # packages beyond those of the tests
+NEEDED = {"neural_field": "torch", "ros2_node": "rclpy"}  # packages beyond those of the tests
 EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("*.py"))
 
 
