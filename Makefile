@@ -63,5 +63,6 @@ $(VENV)/bin/python:
 	$(BIN)/pip install --quiet --upgrade pip
 
 $(VENV)/.installed-%: $(VENV)/bin/python $(SOURCES)
+	@echo "Building fieldalign and fetching what it needs ($*): a minute or so, in silence."
 	$(BIN)/pip install --quiet '.[$*]'
 	touch $@

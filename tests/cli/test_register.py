@@ -62,6 +62,7 @@ def test_a_pose_that_is_not_accepted_is_status_3(call):
     assert (status, err) == (3, "")
     assert "Not accepted: " in out
     assert pose_of(out).shape == (4, 4)
+    assert out.splitlines()[-1].startswith("One is 100 times as large as the other: are both in one unit?")
 
 
 def test_missing_returns_are_told(call, scans, corner):

@@ -17,6 +17,8 @@ from .files import check_output, check_picture, check_report, drawn, write_moved
 from .poses import read_dof, read_pose
 from .progress import stages
 
+_ANOTHER_UNIT = 30  # times as large: rather another unit than a part of the whole
+
 
 @click.command("register")
 @click.argument("source", type=click.Path())
@@ -95,7 +97,17 @@ def command(
 
             write_report(result, *pair, report, f"{Path(source).name} onto {Path(target).name}")
         write_json(result, json_path)
-    return tell(result, json_path)
+    status = tell(result, json_path)
+    if not (result.accepted or scale or json_path == "-"):
+        _ask_about_units(pair[0].extent / pair[1].extent)
+    return status
+
+
+def _ask_about_units(ratio: float) -> None:
+    """A hint where the one cloud is so much larger than the other that its unit may be another one."""
+    factor = max(ratio, 1 / ratio)
+    if factor > _ANOTHER_UNIT:
+        click.echo(f"One is {factor:.0f} times as large as the other: are both in one unit? --scale seeks the factor.")
 
 
 def _settings(method: str, preset: str | None, length_scale: float | None) -> fa.Settings | None:
