@@ -23,8 +23,8 @@ def draw(verdicts):
     figure, axes = plt.subplots(1, len(verdicts), figsize=(3.2 * len(verdicts), 2.6), sharey=True)
     for axis, (name, verdict) in zip(np.atleast_1d(axes), verdicts.items(), strict=True):
         factors = verdict.evidence.factors
-        values = np.clip(list(factors.values()), 0.03, 300)
-        axis.barh(list(factors), values, left=0, color=["#c0392b" if value < 1 else "#27ae60" for value in values])
+        values = np.clip(list(factors.values()), 0.04, 300)
+        axis.barh(list(factors), values - 0.03, left=0.03, color=["#c0392b" if value < 1 else "#27ae60" for value in values])
         axis.axvline(1, color="black")
         axis.set(xscale="log", xlim=(0.03, 300), title=f"{name}\n{verdict.reason.name}")
     figure.tight_layout()
