@@ -24,7 +24,8 @@ def draw(verdicts):
     for axis, (name, verdict) in zip(np.atleast_1d(axes), verdicts.items(), strict=True):
         factors = verdict.evidence.factors
         values = np.clip(list(factors.values()), 0.04, 300)
-        axis.barh(list(factors), values - 0.03, left=0.03, color=["#c0392b" if value < 1 else "#27ae60" for value in values])
+        colors = np.where(values < 1, "#c0392b", "#27ae60")
+        axis.barh(list(factors), values - 0.03, left=0.03, color=colors)
         axis.axvline(1, color="black")
         axis.set(xscale="log", xlim=(0.03, 300), title=f"{name}\n{verdict.reason.name}")
     figure.tight_layout()
