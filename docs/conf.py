@@ -38,13 +38,20 @@ ITEM = re.compile(rf"({NAME}(?:, {NAME})*): (.+)")
 
 
 def with_trees(text: str) -> str:
-    """A page of lists of links, each section a tree of the pages that its links name."""
-    sections = re.split(r"^## ", text, flags=re.MULTILINE)
+    """A page of lists of links, each section a tree of the pages that its links name; the last one of those it forgot."""
+    forgotten = {page.stem for page in HERE.glob("*.md")} - {root_doc}
     trees = []
-    for section in sections[1:]:
-        pages = "\n".join(re.findall(r"^- \[.*?\]\((.+?)\.md\)", section, flags=re.MULTILINE))
-        trees.append(f"```{{toctree}}\n:hidden:\n:caption: {section.splitlines()[0]}\n\n{pages}\n```\n")
-    return "\n".join([text, *trees])
+    for section in re.split(r"^## ", text, flags=re.MULTILINE)[1:]:
+        pages = re.findall(r"^- \[.*?\]\((.+?)\.md\)", section, flags=re.MULTILINE)
+        forgotten -= set(pages)
+        trees.append(tree(pages, section.splitlines()[0]))
+    return "\n".join([text, *trees, *([tree(sorted(forgotten), "More")] if forgotten else [])])
+
+
+def tree(pages: list[str], caption: str) -> str:
+    """A part of the navigation."""
+    lines = "\n".join(pages)
+    return f"```{{toctree}}\n:hidden:\n:caption: {caption}\n\n{lines}\n```\n"
 
 
 def with_tables(text: str) -> str:
