@@ -38,7 +38,7 @@ ITEM = re.compile(rf"({NAME}(?:, {NAME})*): (.+)")
 
 
 def with_trees(text: str) -> str:
-    """A page of lists of links, each section a tree of the pages that its links name; the last one of those it forgot."""
+    """A page of lists of links, each section a tree of the pages that its links name; a last one of what it forgot."""
     forgotten = {page.stem for page in HERE.glob("*.md")} - {root_doc}
     trees = []
     for section in re.split(r"^## ", text, flags=re.MULTILINE)[1:]:
