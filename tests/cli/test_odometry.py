@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import fieldalign as fa
-from fieldalign.cli.executors import bar
+from fieldalign.cli.progress import bar
 from fieldalign.motions import translation
 
 FRAMES = 14

@@ -1,20 +1,29 @@
-"""The command line: one file per verb; each parses, calls one public function and prints."""
+"""The command line: one file per verb; each parses, calls one public function and prints.
+
+A verb's file imports what it works with where it works: its --help waits for no library.
+"""
 
 from __future__ import annotations
 
 import logging
+import signal
 import sys
+import threading
+import traceback
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
+from typing import NoReturn
 
 import click
 
 from ..errors import FieldalignError
+from . import loudness
 
 VERBS = (
-    "register", "verify", "batch", "assemble", "odometry", "localize", "evaluate", "deviation", "experiment", "demo",
+    "register", "verify", "batch", "assemble", "odometry", "localize", "evaluate", "deviation", "plot", "experiment",
+    "demo", "completion",
 )
 
 
@@ -26,26 +35,34 @@ class LazyVerbs(click.Group):
         return list(VERBS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """The command of a verb, from the file of its name."""
+        """The command of a verb, from the file of its name, with the options that every verb has."""
         if cmd_name not in VERBS:
             return None
         command: click.Command = import_module(f".{cmd_name}", __name__).command
+        if not any(parameter.name == "quiet" for parameter in command.params):
+            command.params += loudness.options()
         return command
 
 
-@click.group(cls=LazyVerbs, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=LazyVerbs, context_settings={"help_option_names": ["-h", "--help"]}, params=loudness.options())
 @click.version_option(package_name="fieldalign")
 def cli() -> None:
     """Find the rigid motion between scans, and say whether it can be trusted.
 
-    Exit status: 0 accepted, 1 an error of the user, 3 finished but not accepted.
+    Exit status: 0 accepted, 1 an error of the user, 3 finished but not accepted, 130 and 143 ended by Ctrl-C (SIGINT)
+    and SIGTERM.
     """
 
 
 def main(args: list[str] | None = None) -> None:
-    """Runs a command; an error of the user is one line on stderr and exit status 1, a warning one line."""
+    """Runs a command; an error of the user is one line on stderr and exit status 1, a warning one line.
+
+    A SIGINT (Ctrl-C) or SIGTERM ends it with exit status 130 or 143; a file that it was writing is not there, or is the
+    older one.
+    """
+    loudness.reset()
     try:
-        with _one_line_warnings():
+        with _ended_by_sigterm(), _one_line_warnings():
             status = cli.main(args=args, prog_name="fieldalign", standalone_mode=False)
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.format_message())
@@ -53,28 +70,57 @@ def main(args: list[str] | None = None) -> None:
     except click.ClickException as error:
         _fail(error.format_message())
     except FieldalignError as error:
+        if loudness.is_verbose():
+            traceback.print_exc()
         _fail(str(error))
-    except click.Abort:
-        sys.exit(130)
+    except (click.Abort, KeyboardInterrupt):
+        sys.exit(128 + signal.SIGINT)
     sys.exit(status or 0)
+
+
+@contextmanager
+def _ended_by_sigterm() -> Iterator[None]:
+    """A SIGTERM ends the command in order, as Ctrl-C does: what it had begun to write is removed."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, _end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _end(number: int, frame: object) -> NoReturn:
+    sys.exit(128 + number)
 
 
 @contextmanager
 def _one_line_warnings() -> Iterator[None]:
     """What the library warns of or logs, as single lines on stderr while a command runs."""
-    handler = logging.StreamHandler()
-    handler.setFormatter(logging.Formatter("Warning: %(message)s"))
+    handler = _Warnings()
     logger = logging.getLogger("fieldalign")
     logger.addHandler(handler)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("default", UserWarning)
-            warnings.showwarning = lambda message, *_, **__: click.echo(f"Warning: {message}", err=True)
+            warnings.showwarning = lambda message, *_, **__: _warn(str(message))
             yield
     finally:
         logger.removeHandler(handler)
 
 
-def _fail(message: str) -> None:
+class _Warnings(logging.Handler):
+    def emit(self, record: logging.LogRecord) -> None:
+        _warn(record.getMessage())
+
+
+def _warn(message: str) -> None:
+    """A line, in place of a bar that stands there."""
+    if not loudness.is_quiet():
+        click.echo(("\r\x1b[K" if sys.stderr.isatty() else "") + f"Warning: {message}", err=True)
+
+
+def _fail(message: str) -> NoReturn:
     click.echo("Error: " + " ".join(message.split()), err=True)
     sys.exit(1)

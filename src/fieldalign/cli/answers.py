@@ -7,7 +7,6 @@ import sys
 from typing import Any, Protocol
 
 import click
-import numpy as np
 
 import fieldalign as fa
 
@@ -41,6 +40,8 @@ def as_json(result: Told) -> str:
 
 def _print(result: fa.RegistrationResult) -> None:
     """The pose, so that it can be copied, and what is known of it."""
+    import numpy as np
+
     click.echo("T_target_source =")
     np.savetxt(sys.stdout, result.T_target_source, fmt="% .9f")
     click.echo(result.verdict)

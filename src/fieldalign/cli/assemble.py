@@ -9,15 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import click
-import numpy as np
 
 import fieldalign as fa
 
-from ..clouds.files import writer_of
 from ..errors import ArgumentError
-from ..motions import as_rigid
-from .executors import bar, chosen_executor, executor_options
-from .files import check_folder, check_report, write_text
+from .executors import chosen_executor, executor_options
+from .files import check_folder, check_output, check_report, write_text
+from .progress import Tell, bar
 
 
 @click.command("assemble")
@@ -58,8 +56,7 @@ def command(
 
     Exit status 0: all scans are placed in one frame; 3: some are left out, or there are several components.
     """
-    if output is not None:
-        writer_of(output)
+    check_output(output)
     check_folder(output, poses_to, json_path)
     check_report(report)
     places = None if moved is None else _places(Path(moved), scans)
@@ -76,15 +73,14 @@ def command(
             write_assembly_report(
                 found, scans, report, progress=lambda finished, of: progress("drawing", finished, of)
             )
+        if output is not None:
+            _write_models(output, found, progress)
+        if places is not None:
+            _write_moved(places, scans, found, progress)
     placed = {scan: None if T is None else T.tolist() for scan, T in zip(scans, found.poses, strict=True)}
     write_text(poses_to, json.dumps(placed, indent=1))
     everything = json.dumps({"scans": list(scans)} | found.to_dict(), indent=1)
     write_text(json_path, everything)
-    if output is not None:
-        for number, model in enumerate(found.models, 1):
-            fa.write_cloud(_numbered(output, number), model)
-    if places is not None:
-        _write_moved(places, scans, found)
     if json_path == "-":
         click.echo(everything)
     else:
@@ -94,6 +90,8 @@ def command(
 
 def _read_poses(path: str, scans: Sequence[str]) -> list[Any]:
     """The pose of each scan, None of those that the file does not name."""
+    from ..motions import as_rigid
+
     try:
         given = json.loads(Path(path).read_text())
     except (OSError, ValueError) as error:
@@ -111,6 +109,13 @@ def _index(name: str, scans: Sequence[str]) -> int:
     return scans.index(name)
 
 
+def _write_models(output: str, found: fa.Assembly, progress: Tell) -> None:
+    count = len(found.components)
+    for number in range(count):
+        progress("writing", number, count)
+        fa.write_cloud(_numbered(output, number + 1), found.models[number])
+
+
 def _numbered(path: str, number: int) -> str:
     file = Path(path)
     return path if number == 1 else str(file.with_name(f"{file.stem}_{number}{file.suffix}"))
@@ -118,6 +123,8 @@ def _numbered(path: str, number: int) -> str:
 
 def _places(folder: Path, scans: Sequence[str]) -> dict[str, tuple[Path, Path]]:
     """The folder, and within it where each scan goes: as it lies below the folder that holds them all."""
+    from ..clouds.files import writer_of
+
     files = [Path(scan).absolute() for scan in scans]
     common = Path(os.path.commonpath([file.parent for file in files]))
     for scan in scans:
@@ -125,10 +132,17 @@ def _places(folder: Path, scans: Sequence[str]) -> dict[str, tuple[Path, Path]]:
     return {scan: (folder, file.relative_to(common)) for scan, file in zip(scans, files, strict=True)}
 
 
-def _write_moved(places: dict[str, tuple[Path, Path]], scans: Sequence[str], found: fa.Assembly) -> None:
+def _write_moved(
+    places: dict[str, tuple[Path, Path]], scans: Sequence[str], found: fa.Assembly, progress: Tell
+) -> None:
     """Each placed scan with all that its file says of it, one at a time; a folder per component if there are more."""
+    import numpy as np
+
+    moved, count = 0, sum(map(len, found.components))
     for number, members in enumerate(found.components, 1):
         for k in members:
+            progress("moving", moved, count)
+            moved += 1
             folder, below = places[scans[k]]
             place = (folder if len(found.components) == 1 else folder / f"component_{number}") / below
             place.parent.mkdir(parents=True, exist_ok=True)
@@ -136,6 +150,8 @@ def _write_moved(places: dict[str, tuple[Path, Path]], scans: Sequence[str], fou
 
 
 def _tell(scans: Sequence[str], found: fa.Assembly) -> None:
+    import numpy as np
+
     placed = sum(map(len, found.components))
     click.echo(f"{placed} of {len(scans)} scans placed, by {len(found.edges)} of {found.tried} pairs, in "
                f"{sum(found.seconds.values()):.1f} s")

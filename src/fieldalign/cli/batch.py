@@ -6,19 +6,22 @@ import csv
 import io
 import json
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
 import fieldalign as fa
 
 from ..errors import ArgumentError
-from ..motions import Matrix
-from .executors import bar, chosen_executor, executor_options
+from .executors import chosen_executor, executor_options
 from .files import check_folder, check_report, write_text
 from .poses import read_pose
+from .progress import Tell, bar
+
+if TYPE_CHECKING:
+    from ..motions import Matrix
 
 _SHOWN = 10  # failures that are told
 _POSE = [f"T{row}{column}" for row in range(4) for column in range(4)]
@@ -80,8 +83,7 @@ def command(
 
 
 def _write_report(
-    results: Sequence[fa.PairResult], pairs: Sequence[Sequence[Any]], path: str, title: str,
-    tell: Callable[[str, int, int | None], None],
+    results: Sequence[fa.PairResult], pairs: Sequence[Sequence[Any]], path: str, title: str, tell: Tell
 ) -> None:
     from ..reports.page_batch import write_batch_report
 

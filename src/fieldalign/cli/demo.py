@@ -5,14 +5,14 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from pathlib import Path
 
 import click
-import numpy as np
 
 import fieldalign as fa
-from fieldalign.clouds.simulated import simulate_pair
-from fieldalign.evaluation import rotation_error, translation_error
+
+from . import loudness
+from .files import made_folder, write_text
+from .progress import stages
 
 
 @click.command("demo")
@@ -24,19 +24,28 @@ def command(output: str, seed: int, points: int) -> int:
 
     Leaves source.ply, target.ply, aligned.ply, result.json, truth.txt and, with the extra viz, picture.png.
     """
-    folder = Path(output)
-    folder.mkdir(parents=True, exist_ok=True)
-    pair = simulate_pair(seed, points)
-    fa.write_cloud(folder / "source.ply", pair.source)
-    fa.write_cloud(folder / "target.ply", pair.target)
-    np.savetxt(folder / "truth.txt", pair.T_target_source)
+    import numpy as np
+
+    from ..clouds.simulated import simulate_pair
+    from ..evaluation import rotation_error, translation_error
+
+    folder = made_folder(output)
+    with stages({"simulating": 9, "writing": 1}) as stage:
+        stage()
+        pair = simulate_pair(seed, points)
+        stage()
+        fa.write_cloud(folder / "source.ply", pair.source)
+        fa.write_cloud(folder / "target.ply", pair.target)
+        truth = "\n".join(" ".join(map(repr, row)) for row in pair.T_target_source.tolist())
+        write_text(str(folder / "truth.txt"), truth + "\n")
     click.echo(f"Two scans of {points} points of a simulated room, overlap {pair.overlap:.0%}, in {folder}")
     arguments = ["source.ply", "target.ply", "--output", "aligned.ply", "--json", "result.json"]
     if _can_draw():
         arguments += ["--picture", "picture.png"]
     click.echo(f"$ cd {folder} && fieldalign register {' '.join(arguments)}")
     (folder / "result.json").unlink(missing_ok=True)
-    status = subprocess.run([sys.executable, "-m", "fieldalign", "register", *arguments], cwd=folder).returncode
+    program = [sys.executable, "-m", "fieldalign", "register"]
+    status = subprocess.run([*program, *arguments, *loudness.flags()], cwd=folder).returncode
     if not (folder / "result.json").exists():
         return status
     result = json.loads((folder / "result.json").read_text())

@@ -8,13 +8,11 @@ import click
 
 import fieldalign as fa
 
-from ..clouds.files import writer_of
 from ..errors import ArgumentError
-from ..fields.files import read_field
 from .answers import as_json, write_json
 from .files import check_folder, check_picture
 from .poses import read_pose
-from .progress import stages
+from .progress import file_size, stages
 
 
 @click.command("deviation")
@@ -41,9 +39,12 @@ def command(
 
     Exit status 0: all points are within the tolerance, or none is given; 3: some are beyond it.
     """
+    from ..fields.files import read_field
+
     T = None if pose is None else read_pose(pose, "pose")
     _check_outputs(output, csv, picture, json_path)
-    with stages("reading scan", "reading part", "measuring", "writing") as stage:
+    scan, other = file_size(aligned), file_size(part)
+    with stages({"reading scan": scan, "reading part": other, "measuring": 10 * scan, "writing": scan}) as stage:
         stage()
         cloud = fa.read_cloud(aligned)
         stage()
@@ -67,6 +68,8 @@ def command(
 
 def _check_outputs(output: str | None, csv: str | None, picture: str | None, json_path: str | None) -> None:
     """What cannot be written is said before the work, not after it."""
+    from ..clouds.files import writer_of
+
     for path in (output, csv):
         if path is not None:
             writer_of(path)

@@ -1,15 +1,14 @@
-"""Where the work on many pairs runs, as commands are told; and the bar that shows how far it is."""
+"""Where the work on many pairs runs, as commands are told."""
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from typing import Any
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..assembly.executor import AnyExecutor, Dask, Processes
+if TYPE_CHECKING:
+    from ..assembly.executor import AnyExecutor
 
 
 def executor_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -29,31 +28,8 @@ def executor_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 def chosen_executor(workers: int | None, dask: str | None) -> AnyExecutor:
     """The executor that the options name; this process where they name none."""
+    from ..assembly.executor import Dask, Processes
+
     if dask is not None:
         return Dask(dask, workers)
     return None if workers in (None, 1) else Processes(workers)
-
-
-@contextmanager
-def bar() -> Iterator[Callable[[str, int, int | None], None]]:
-    """A bar on stderr with the time that is left, for stages of work: tell(stage, finished, of), where None is a number
-    that nobody knows. Nothing where no person looks."""
-    shown: Any = None
-
-    def tell(stage: str, finished: int, of: int | None) -> None:
-        nonlocal shown
-        if finished == 0:
-            if shown is not None:
-                shown.render_finish()
-            shown = click.progressbar(
-                (None for _ in ()), length=of, label=stage, file=sys.stderr, hidden=not sys.stderr.isatty(),
-                show_pos=True,
-            )
-            shown.render_progress()
-        shown.update(finished - shown.pos)
-
-    try:
-        yield tell
-    finally:
-        if shown is not None:
-            shown.render_finish()

@@ -4,19 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from ..assembly.executor import as_executor
 from ..errors import ArgumentError
-from ..experiments import NAMES, Report, Request, run
-from ..threads import resolve_threads
-from .executors import bar, chosen_executor, executor_options
-from .files import check_report
+from .executors import chosen_executor, executor_options
+from .files import check_report, made_folder
+from .progress import bar
+
+if TYPE_CHECKING:
+    from ..experiments import Report
+
+NAMES = (
+    "modelnet40", "shapenet", "success-rate", "efficiency", "density", "noise", "distance-field", "pseudo-sets",
+    "data-examples", "3dmatch", "kitti", "kitti-trajectory", "ablation",
+)
 
 
 @click.command("experiment")
-@click.argument("name", type=click.Choice(list(NAMES)))
+@click.argument("name", type=click.Choice(NAMES))
 @click.option("--data", required=True, type=click.Path(exists=True, file_okay=False),
               help="The folder of the data set, in its published layout.")
 @click.option("--output", required=True, type=click.Path(file_okay=False), help="The folder of the results.")
@@ -50,10 +57,15 @@ def command(
     into the folder, which is made where it is not there; of several tables in one NAME.md, each has a .json of its own.
     Called again after an interruption it goes on from there.
     """
+    from ..assembly.executor import as_executor
+    from ..experiments import NAMES as PLACES
+    from ..experiments import Request, run
+    from ..threads import resolve_threads
+
     check_report(page)
-    if page is not None and NAMES[name][0].startswith("pictures."):
+    if page is not None and PLACES[name][0].startswith("pictures."):
         raise ArgumentError(f"--report shows registrations, but {name} is a picture: it has none")
-    folder = _folder(output)
+    folder = made_folder(output)
     if pointnetlk is not None and peers is None:
         raise ArgumentError("--pointnetlk-revisited needs --peers FOLDER, which holds its adapter")
     checkouts = {} if pointnetlk is None else {"pointnetlk-revisited": Path(pointnetlk)}
@@ -80,12 +92,3 @@ def _write_page(report: Report, path: str, progress: Callable[[int, int], None])
         write_experiment_report(report.results, path, report.title, progress)
     for title, evaluation in list(report.drives.items())[:1]:
         write_odometry_report(evaluation.trajectory, path, evaluation=evaluation, title=f"{report.title}, {title}")
-
-
-def _folder(output: str) -> Path:
-    folder = Path(output)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ArgumentError(f"--output {output} cannot be made: {error.strerror or error}") from error
-    return folder

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING, TypeAlias
 
 import fieldalign as fa
 
 from .. import whole_file
-from ..clouds.files import writer_of
 from ..errors import ArgumentError
-from ..fields import DistanceField, MeshField, spread_over
-from ..fields.files import check_mesh_path, is_mesh_path, write_mesh
-from ..motions import Matrix, apply
 
-Shape = fa.PointCloud | DistanceField
+if TYPE_CHECKING:
+    from ..fields import DistanceField
+    from ..motions import Matrix
+
+    Shape: TypeAlias = fa.PointCloud | DistanceField
 
 _DRAWN = 30_000  # places that stand for a surface in a picture
 
@@ -22,6 +23,10 @@ def check_output(path: str | None, source: Shape | None = None) -> None:
     """Raises where a source cannot be written to a path; without a source, where none could be."""
     if path is None:
         return
+    from ..clouds.files import writer_of
+    from ..fields import MeshField
+    from ..fields.files import check_mesh_path, is_mesh_path
+
     if isinstance(source, MeshField) or (source is None and is_mesh_path(path)):
         check_mesh_path(path)
     elif source is None or isinstance(source, fa.PointCloud):
@@ -35,6 +40,16 @@ def check_folder(*paths: str | None) -> None:
     for path in paths:
         if path is not None and path != "-" and not Path(path).absolute().parent.is_dir():
             raise ArgumentError(f"{path} cannot be written: there is no folder {Path(path).parent}")
+
+
+def made_folder(path: str) -> Path:
+    """The folder of --output, made where it is not there."""
+    folder = Path(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ArgumentError(f"--output {path} cannot be made: {error.strerror or error}") from error
+    return folder
 
 
 def write_text(path: str | None, text: str) -> None:
@@ -66,6 +81,10 @@ def check_report(path: str | None) -> None:
 
 def write_moved(path: str, source: Shape, T: Matrix) -> None:
     """Writes a cloud, or the triangles of a mesh, moved by T (4, 4)."""
+    from ..fields import MeshField
+    from ..fields.files import write_mesh
+    from ..motions import apply
+
     if isinstance(source, MeshField):
         write_mesh(path, apply(T, source.vertices), source.faces)
     elif isinstance(source, fa.PointCloud):
@@ -74,4 +93,6 @@ def write_moved(path: str, source: Shape, T: Matrix) -> None:
 
 def drawn(shape: Shape) -> fa.PointCloud:
     """A cloud as it is, or places on a surface."""
+    from ..fields import spread_over
+
     return shape if isinstance(shape, fa.PointCloud) else fa.PointCloud(spread_over(shape, _DRAWN))

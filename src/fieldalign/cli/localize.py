@@ -5,17 +5,17 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
-import numpy as np
 
 import fieldalign as fa
 
-from ..odometry.sequences.bags import is_bag
-from ..odometry.sequences.sequence import Frame
-from .executors import bar
 from .files import check_folder, write_text
+from .progress import bar
+
+if TYPE_CHECKING:
+    from ..odometry.sequences.sequence import Frame
 
 
 @click.command("localize")
@@ -36,9 +36,12 @@ def command(
     Exit status 0: every scan has its place; 3: some have none, and why.
     """
     check_folder(trajectory, json_path)
-    localizer = fa.Localizer(map_path, seed=seed)
+    import numpy as np
+
     names, stamps = [], []
     with bar() as tell:
+        tell("reading map", 0, None)
+        localizer = fa.Localizer(map_path, seed=seed)
         count, frames = _frames(scans, topic)
         tell("scans", 0, count)
         for number, (name, frame) in enumerate(frames):
@@ -60,6 +63,9 @@ def command(
 
 def _frames(scans: tuple[str, ...], topic: str | None) -> tuple[int | None, Iterator[tuple[str, Frame]]]:
     """How many there are, and each with its name: a scan's path, or its number in the drive."""
+    from ..odometry.sequences.bags import is_bag
+    from ..odometry.sequences.sequence import Frame
+
     first = Path(scans[0])
     if len(scans) == 1 and first.exists() and (first.is_dir() or is_bag(first)):
         sequence = fa.read_sequence(first, topic=topic)

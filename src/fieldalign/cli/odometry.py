@@ -5,17 +5,18 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 import fieldalign as fa
 
 from ..errors import MissingExtraError
-from ..odometry import drive as drives
-from ..odometry.sequences.sweeps import SWEEPS
-from .executors import bar
 from .files import check_picture, check_report, is_page_path
+from .progress import bar
+
+if TYPE_CHECKING:
+    from ..odometry.drive import Drive
 
 _SHOWN = 8  # frames that are told by their numbers
 
@@ -25,7 +26,7 @@ _SHOWN = 8  # frames that are told by their numbers
 @click.option("--output", type=click.Path(file_okay=False), required=True,
               help="The folder for the trajectory, the map, the frames and the report.")
 @click.option("--topic", help="Of a bag, which; needed where it holds several with PointCloud2.")
-@click.option("--sweep", type=click.Choice(SWEEPS),
+@click.option("--sweep", type=click.Choice(["clockwise", "counterclockwise"]),
               help="The sensor spins this way, seen from above: its points get their times from their azimuth.")
 @click.option("--no-deskew", is_flag=True, help="Take each scan for what is seen at one moment.")
 @click.option("--loops", is_flag=True, help="At the end, close the loops of a drive that comes back.")
@@ -52,8 +53,10 @@ def command(
     first two and the map are those after the loops were closed, and odometry_tum.txt is the trajectory before. Ctrl-C
     ends the drive after the frame at hand, and all is written up to there.
 
-    Exit status 0: every frame was tracked; 3: some were not.
+    Exit status 0: every frame was tracked; 3: some were not; 130 and 143: ended by Ctrl-C and by SIGTERM.
     """
+    from ..odometry import drive as drives
+
     is_page = report is not None and is_page_path(report)
     (check_report if is_page else check_picture)(report)
     truly = None if truth is None else fa.read_trajectory(truth)
@@ -63,23 +66,31 @@ def command(
         tell("frames", 0, frames.length)
         drive = drives.run(frames, odometry, output, lambda done, of: tell("frames", done, of), prefetch=True)
         closed = fa.close_loops(odometry, seed=seed, progress=tell) if loops else None
-    trajectory = drive.trajectory
-    if closed is not None:
-        trajectory = fa.Trajectory(trajectory.times, closed.trajectory.poses, closed.trajectory.covariances,
-                                   trajectory.has_times)
-        _write_closed(Path(output), drive.trajectory, trajectory, closed)
-    evaluation = None if truly is None else _evaluated(trajectory, truly)
-    if evaluation is not None:
-        drives.add_to_summary(output, evaluation=evaluation.to_dict())
+        tell("writing", 0, None)
+        trajectory = drive.trajectory
+        if closed is not None:
+            trajectory = fa.Trajectory(trajectory.times, closed.trajectory.poses, closed.trajectory.covariances,
+                                       trajectory.has_times)
+            _write_closed(Path(output), drive.trajectory, trajectory, closed)
+        evaluation = None if truly is None else _evaluated(trajectory, truly)
+        if evaluation is not None:
+            drives.add_to_summary(output, evaluation=evaluation.to_dict())
+        tell("drawing", 0, None)
+        if is_page:
+            _write_page(str(report), drive, trajectory, odometry.map if closed is None else closed.map, evaluation)
+            report = None
+        picture = Path(output, "trajectory.png") if report is None else Path(report)
+        missing = _draw(picture, trajectory, evaluation, report is None)
     _tell(drive, closed, evaluation)
-    if is_page:
-        _write_page(str(report), drive, trajectory, odometry.map if closed is None else closed.map, evaluation)
-        report = None
-    _draw(Path(output, "trajectory.png") if report is None else Path(report), trajectory, evaluation, report is None)
+    click.echo(missing, nl=bool(missing))
+    if drive.interrupted:
+        return 128 + drive.signal
     return 0 if drive.tracked else 3
 
 
 def _write_closed(folder: Path, before: fa.Trajectory, after: fa.Trajectory, closed: fa.ClosedLoops) -> None:
+    from ..odometry import drive as drives
+
     fa.write_trajectory(folder / "odometry_tum.txt", before)
     for form in ("tum", "kitti"):
         fa.write_trajectory(folder / f"trajectory_{form}.txt", after, form)
@@ -93,7 +104,7 @@ def _evaluated(trajectory: fa.Trajectory, truth: fa.Trajectory) -> fa.Evaluation
     return fa.evaluate(trajectory, truth, max_difference=0.01 if has_both else None)
 
 
-def _tell(drive: drives.Drive, closed: fa.ClosedLoops | None, evaluation: fa.Evaluation | None) -> None:
+def _tell(drive: Drive, closed: fa.ClosedLoops | None, evaluation: fa.Evaluation | None) -> None:
     said: dict[str, Any] = drive.to_dict()
     each = said["seconds_a_frame"]
     click.echo(f"{said['frames']} frames over {said['length']:.6g} m{', interrupted' if drive.interrupted else ''}; "
@@ -118,7 +129,7 @@ def _numbers(frames: Sequence[int]) -> str:
 
 
 def _write_page(
-    path: str, drive: drives.Drive, trajectory: fa.Trajectory, world: fa.PointCloud, evaluation: fa.Evaluation | None
+    path: str, drive: Drive, trajectory: fa.Trajectory, world: fa.PointCloud, evaluation: fa.Evaluation | None
 ) -> None:
     from ..reports import write_odometry_report
 
@@ -127,8 +138,8 @@ def _write_page(
     write_odometry_report(trajectory, path, reasons=reasons, world=world, evaluation=evaluation, title=title)
 
 
-def _draw(path: Path, trajectory: fa.Trajectory, evaluation: fa.Evaluation | None, is_optional: bool) -> None:
-    """The picture; where nobody asked for it and it cannot be drawn, a sentence."""
+def _draw(path: Path, trajectory: fa.Trajectory, evaluation: fa.Evaluation | None, is_optional: bool) -> str:
+    """The picture; where nobody asked for it and it cannot be drawn, a sentence that says so."""
     from ..reports.trajectory_picture import trajectory_picture
 
     try:
@@ -139,4 +150,5 @@ def _draw(path: Path, trajectory: fa.Trajectory, evaluation: fa.Evaluation | Non
     except MissingExtraError as error:
         if not is_optional:
             raise
-        click.echo(f"no picture: {error}")
+        return f"no picture: {error}"
+    return ""

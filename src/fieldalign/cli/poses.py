@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from ..dof import Dof
 from ..errors import ArgumentError
-from ..motions import Matrix, as_rigid, as_similar
+
+if TYPE_CHECKING:
+    from ..dof import Dof
+    from ..motions import Matrix
 
 
 def read_pose(text: str, name: str = "init", scaled: bool = False) -> Matrix:
@@ -20,6 +20,10 @@ def read_pose(text: str, name: str = "init", scaled: bool = False) -> Matrix:
     A .json file holds 4 rows, or an object with the key T_target_source, as `--json` writes it.
     name: of the argument, in errors. Raises ArgumentError where it is none.
     """
+    import numpy as np
+
+    from ..motions import as_rigid, as_similar
+
     try:
         values = _from_file(Path(text)) if Path(text).is_file() else np.array(text.replace(",", " ").split(), float)
     except (OSError, ValueError, EOFError) as error:
@@ -31,6 +35,8 @@ def read_pose(text: str, name: str = "init", scaled: bool = False) -> Matrix:
 
 
 def _from_file(path: Path) -> Any:
+    import numpy as np
+
     if path.suffix == ".npy":
         return np.load(path, allow_pickle=False)
     if path.suffix == ".json":
@@ -45,4 +51,6 @@ def read_dof(free: str | None, axis: str | None, centre: str | None) -> Dof | No
         if axis is not None or centre is not None:
             raise ArgumentError("--dof-axis and --dof-centre say about what --dof is free, but there is no --dof")
         return None
+    from ..dof import Dof
+
     return Dof(free, *(None if part is None else part.replace(",", " ").split() for part in (axis, centre)))

@@ -9,13 +9,13 @@ import click
 import fieldalign as fa
 
 from ..errors import ArgumentError
-from ..fields.files import read_shape
-from ..prepare import prepare_pair
-from ..threads import resolve_threads
 from .answers import tell, write_json
 from .files import check_output, check_picture, check_report, drawn, write_moved
 from .poses import read_dof, read_pose
-from .progress import stages
+from .progress import file_size, stages
+
+
+_PRESETS = ("object", "indoor", "outdoor", "object-near", "indoor-dense")  # fa.PRESETS
 
 _ANOTHER_UNIT = 30  # times as large: rather another unit than a part of the whole
 
@@ -36,7 +36,8 @@ _ANOTHER_UNIT = 30  # times as large: rather another unit than a part of the who
 @click.option("--report", type=click.Path(), help="Write a page with all of it, in 3D, to keep (.html).")
 @click.option("--method", type=click.Choice(["robust", "paper"]), default="robust", show_default=True,
               help="robust: from any pose; paper: as published, from --init or the centroids.")
-@click.option("--settings", type=click.Choice(list(fa.PRESETS)), help="Of the paper's method.  [default: indoor]")
+@click.option("--settings", type=click.Choice(_PRESETS),
+              help="Of the paper's method.  [default: indoor]")
 @click.option("--length-scale", type=click.FloatRange(min=0, min_open=True),
               help="Of the paper's method: multiply its lengths, which are metres: 1000 for millimetres.")
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of every random draw.")
@@ -66,13 +67,20 @@ def command(
     SOURCE and TARGET are in one unit: scans (.ply, .pcd, .xyz, .txt, .csv, .npy, .npz, .bin, .las, .laz, .e57, .obj),
     meshes, taken by their triangles (.stl, .ply, .obj, .off), or volumes (.nrrd, .nhdr, .npz with `values`).
     """
+    from ..fields.files import read_shape
+    from ..prepare import prepare_pair
+    from ..threads import resolve_threads
+
     chosen = _settings(method, settings, length_scale)
     guess = None if init is None else read_pose(init, scaled=scale)
     free = read_dof(dof, dof_axis, dof_centre)
     check_output(output)
     check_picture(picture)
     check_report(report)
-    with stages("reading source", "reading target", "aligning", "writing") as stage:
+    sizes = file_size(source), file_size(target)
+    with stages(
+        {"reading source": sizes[0], "reading target": sizes[1], "aligning": 4 * sum(sizes), "writing": sum(sizes)}
+    ) as stage:
         stage()
         source_shape = read_shape(source)
         check_output(output, source_shape)

@@ -8,13 +8,10 @@ import click
 
 import fieldalign as fa
 
-from ..fields.files import read_shape
-from ..prepare import prepare_pair
-from ..threads import resolve_threads
 from .answers import tell, write_json
 from .files import check_report
 from .poses import read_pose
-from .progress import stages
+from .progress import file_size, stages
 
 
 @click.command("verify")
@@ -35,9 +32,16 @@ def command(
 
     Exit status 0: it may be used; 3: it may not, and why.
     """
+    from ..fields.files import read_shape
+    from ..prepare import prepare_pair
+    from ..threads import resolve_threads
+
     T_target_source = read_pose(pose, "pose")
     check_report(report)
-    with stages("reading source", "reading target", "judging") as stage:
+    sizes = file_size(source), file_size(target)
+    with stages(
+        {"reading source": sizes[0], "reading target": sizes[1], "judging": 4 * sum(sizes), "writing": sum(sizes)}
+    ) as stage:
         stage()
         source_shape = read_shape(source)
         stage()
@@ -45,6 +49,7 @@ def command(
         stage()
         pair = prepare_pair(source_shape, target_shape, resolve_threads(threads), True)
         result = fa.verify(*pair, T_target_source, search=search, seed=seed, threads=threads)
+        stage()
         write_json(result, json_path)
         if report is not None:
             from ..reports import write_report

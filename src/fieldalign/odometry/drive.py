@@ -67,7 +67,7 @@ class Drive:
     """What came of a drive.
 
     times, poses, covariances: of the frames so far. rows: what frames.csv says of them. stages: seconds of each step by
-    stage. interrupted: whether it was ended before its time.
+    stage. signal: the number of the one that ended it before its time; 0: none did.
     """
 
     sequence: Sequence
@@ -77,7 +77,12 @@ class Drive:
     rows: list[FrameRow] = field(default_factory=list)
     stages: list[Mapping[str, float]] = field(default_factory=list)
     has_stamps: bool = True
-    interrupted: bool = False
+    signal: int = 0
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether it was ended before its time."""
+        return self.signal != 0
 
     @property
     def tracked(self) -> bool:
@@ -149,8 +154,8 @@ def run(
             frames_file.add(drive.rows[-1], drive.covariances[-1])
             if progress is not None:
                 progress(len(drive.rows), sequence.length)
-            if stop():
-                drive.interrupted = True
+            drive.signal = stop()
+            if drive.signal:
                 break
         _finish(drive, odometry, folder)
     return drive

@@ -12,19 +12,19 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 @contextmanager
-def interruptible() -> Iterator[Callable[[], bool]]:
-    """Gives what says whether the run is to end: after a SIGINT (Ctrl-C) or SIGTERM. A second one raises
-    KeyboardInterrupt at once. In a thread that is not the main one, signals are not this run's."""
-    asked = False
+def interruptible() -> Iterator[Callable[[], int]]:
+    """Gives what says whether the run is to end: the number of the SIGINT (Ctrl-C) or SIGTERM that came, or 0. A second
+    one raises KeyboardInterrupt at once. In a thread that is not the main one, signals are not this run's."""
+    asked = 0
 
     def note(number: int, frame: FrameType | None) -> None:
         nonlocal asked
         if asked:
             raise KeyboardInterrupt
-        asked = True
+        asked = number
 
     if threading.current_thread() is not threading.main_thread():
-        yield lambda: False
+        yield lambda: 0
         return
     before = {number: signal.signal(number, note) for number in _SIGNALS}
     try:
