@@ -6,7 +6,6 @@ import json
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -15,6 +14,7 @@ import fieldalign as fa
 from ..errors import ArgumentError
 from .executors import chosen_executor, executor_options
 from .files import check_folder, check_output, check_report, write_text
+from .poses import read_poses
 from .progress import Tell, bar
 
 
@@ -60,7 +60,7 @@ def command(
     check_folder(output, poses_to, json_path)
     check_report(report)
     places = None if moved is None else _places(Path(moved), scans)
-    known = None if poses is None else _read_poses(poses, scans)
+    known = None if poses is None else read_poses(poses, scans)
     with bar() as progress:
         found = fa.assemble(
             list(scans), poses=known, pose_sigma=sigma, fixed=[_index(name, scans) for name in fixed], ordered=ordered,
@@ -86,21 +86,6 @@ def command(
     else:
         _tell(scans, found)
     return 0 if len(found.components) == 1 and not found.left_out else 3
-
-
-def _read_poses(path: str, scans: Sequence[str]) -> list[Any]:
-    """The pose of each scan, None of those that the file does not name."""
-    from ..motions import as_rigid
-
-    try:
-        given = json.loads(Path(path).read_text())
-    except (OSError, ValueError) as error:
-        raise ArgumentError(f"poses must be JSON, {{scan: 4 x 4}}, but {path} is not: {error}") from error
-    if not isinstance(given, dict):
-        raise ArgumentError(f"poses must be JSON, {{scan: 4 x 4}}, but {path} holds no such object")
-    if unknown := sorted(set(given) - set(scans)):
-        raise ArgumentError(f"poses name scans that are not there, the first is {unknown[0]!r}")
-    return [None if given.get(scan) is None else as_rigid(given[scan], f"the pose of {scan}") for scan in scans]
 
 
 def _index(name: str, scans: Sequence[str]) -> int:

@@ -61,7 +61,7 @@ def write_text(path: str | None, text: str) -> None:
 def check_picture(path: str | None) -> None:
     """Raises where a picture cannot be written to a path."""
     if path is not None:
-        from ..reports.picture import checked_path
+        from ..reports.figure_file import checked_path
 
         checked_path(path)
 

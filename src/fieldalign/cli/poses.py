@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -32,6 +33,22 @@ def read_pose(text: str, name: str = "init", scaled: bool = False) -> Matrix:
     if np.size(values) != 16:
         raise ArgumentError(f"{name} must hold 16 numbers (4 x 4, row by row), but {text!r} holds {np.size(values)}")
     return (as_similar if scaled else as_rigid)(np.reshape(values, (4, 4)), name)
+
+
+def read_poses(path: str, scans: Sequence[str]) -> list[Any]:
+    """The pose (4, 4) of each scan, as assemble writes them with --poses-to; None of those that the file does not name
+    or has none of. Raises ArgumentError where it is no such file, or names scans that are not there."""
+    from ..motions import as_rigid
+
+    try:
+        given = json.loads(Path(path).read_text())
+    except (OSError, ValueError) as error:
+        raise ArgumentError(f"poses must be JSON, {{scan: 4 x 4}}, but {path} is not: {error}") from error
+    if not isinstance(given, dict):
+        raise ArgumentError(f"poses must be JSON, {{scan: 4 x 4}}, but {path} holds no such object")
+    if unknown := sorted(set(given) - set(scans)):
+        raise ArgumentError(f"poses name scans that are not there, the first is {unknown[0]!r}")
+    return [None if given.get(scan) is None else as_rigid(given[scan], f"the pose of {scan}") for scan in scans]
 
 
 def _from_file(path: Path) -> Any:

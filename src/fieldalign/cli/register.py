@@ -14,7 +14,6 @@ from .files import check_output, check_picture, check_report, drawn, write_moved
 from .poses import read_dof, read_pose
 from .progress import file_size, stages
 
-
 _PRESETS = ("object", "indoor", "outdoor", "object-near", "indoor-dense")  # fa.PRESETS
 
 _ANOTHER_UNIT = 30  # times as large: rather another unit than a part of the whole

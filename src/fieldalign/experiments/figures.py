@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from ..errors import missing_extra
 from ..fields import PointField
 from ..fields.protocol import Floats
+from ..reports import figure_file
 from ..reports.painting import Image, Window
 from ..reports.shading import Layer, paint_surfaces
 from ..reports.views import sphere
-from ..whole_file import replacing
 from .request import Report, Request
 from .results import head, write_json
 
@@ -39,11 +38,7 @@ def example(items: Sequence[Item]) -> Item:
 
 def new_figure(width: float, height: float) -> Figure:
     """An empty figure; raises MissingExtraError without matplotlib."""
-    try:
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise missing_extra("viz", "drawing a picture") from error
-    return Figure(figsize=(width, height), dpi=_DPI)
+    return figure_file.new_figure(width, height, _DPI)
 
 
 def layer(points: Floats, colors: Floats | Sequence[float], covered: float = SCAN) -> Layer:
@@ -123,8 +118,7 @@ def write_picture(
     """NAME.png, NAME.pdf, and NAME.json with what is shown; each whole or not at all."""
     path = request.output / name
     for suffix in (".png", ".pdf"):
-        with replacing(path.with_suffix(suffix)) as unfinished:
-            figure.savefig(unfinished, format=suffix[1:])
+        figure_file.save(figure, path.with_suffix(suffix))
     said = head(name, title, protocol, request.data, request.seed) | {"shown": shown}
     files = [path.with_suffix(".png"), path.with_suffix(".pdf"), write_json(said, path.with_suffix(".json"))]
     return Report("\n".join([title, *protocol]), files)

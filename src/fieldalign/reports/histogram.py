@@ -8,14 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import missing_extra
 from ..inspection import Deviation, diverging_colors
-from ..whole_file import replacing
-from .picture import checked_path
+from .figure_file import checked_path, new_figure, save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _BARS = 101
 _WIDEST = 3.0  # times what 95 % of the points keep to, or the tolerance: beyond, all stand in the last bar
@@ -31,7 +28,7 @@ def deviation_histogram(deviation: Deviation, path: str | os.PathLike[str], titl
     Raises MissingExtraError without matplotlib, and ArgumentError for a path that cannot be.
     """
     path = checked_path(path)
-    figure = _empty_figure()
+    figure = new_figure(*_SIZE, _DPI, layout="constrained")
     axes = figure.subplots()
     _draw_bars(axes, deviation)
     if deviation.tolerance is not None:
@@ -43,17 +40,7 @@ def deviation_histogram(deviation: Deviation, path: str | os.PathLike[str], titl
     axes.set_xlabel("deviation, negative inside" if deviation.signed else "distance to the surface", color="0.3")
     axes.set_ylabel("points", color="0.3")
     axes.spines[["top", "right"]].set_visible(False)
-    with replacing(path) as unfinished:
-        figure.savefig(unfinished, format=path.suffix[1:].lower())
-    return path
-
-
-def _empty_figure() -> Figure:
-    try:
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise missing_extra("viz", "drawing a picture") from error
-    return Figure(figsize=_SIZE, dpi=_DPI, layout="constrained")
+    return save(figure, path)
 
 
 def _draw_bars(axes: Axes, deviation: Deviation) -> None:

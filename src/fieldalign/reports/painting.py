@@ -5,6 +5,7 @@ Painting with numpy takes a fourth of the time of a scatter plot and hides no cl
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,7 +33,7 @@ class Window:
     height: float
 
 
-def window_of(clouds: Clouds, view: Array) -> Window:
+def window_of(clouds: Sequence[Array], view: Array) -> Window:
     """The window that holds all but a few strays of the clouds, with a margin."""
     seen = np.concatenate(clouds) @ view[:2].T
     low, high = np.percentile(seen, (0.1, 99.9), axis=0)
@@ -43,17 +44,28 @@ def window_of(clouds: Clouds, view: Array) -> Window:
 
 def paint(clouds: Clouds, view: Array, window: Window, columns: int) -> Image:
     """The image (rows, columns, 4) of the window, RGBA, white where there is nothing."""
-    seen = np.concatenate(clouds) @ view.T
-    point = visible(seen, window, columns)
-    colors = np.append(_shaded(clouds, seen[:, 2]), np.uint32(2**32 - 1))  # the last one, white, is for -1
-    return np.ascontiguousarray(colors[point]).view(np.uint8).reshape(*point.shape, 4)
+    colors = np.repeat([SOURCE_COLOR, TARGET_COLOR], [len(cloud) for cloud in clouds], axis=0)
+    return paint_points(np.concatenate(clouds), colors, view, window, columns)
 
 
-def visible(seen: Array, window: Window, columns: int, covered: float = _COVERED) -> NDArray[np.int32]:
+def paint_points(
+    points: Array, colors: Array, view: Array, window: Window, columns: int, radius: float | None = None
+) -> Image:
+    """The same of points (N, 3) in colors (N, 3), 0..1, which are paler the farther they are. radius: of a point's disc
+    in pixels; None: by how many there are."""
+    seen = points @ view.T
+    point = visible(seen, window, columns, radius=radius)
+    shown = np.append(_shaded(colors, seen[:, 2]), np.uint32(2**32 - 1))  # the last one, white, is for -1
+    return np.ascontiguousarray(shown[point]).view(np.uint8).reshape(*point.shape, 4)
+
+
+def visible(
+    seen: Array, window: Window, columns: int, covered: float = _COVERED, radius: float | None = None
+) -> NDArray[np.int32]:
     """Which point each pixel of the window shows, (rows, columns); -1: none.
 
     seen: (N, 3), the points along the view's axes: right, up, to the viewer. covered: the share of the image that the
-    points' discs would cover, side by side.
+    points' discs would cover, side by side. radius: of a disc in pixels, where that is not to choose it.
     """
     scale = columns / window.width
     rows = round(window.height * scale)
@@ -63,27 +75,32 @@ def visible(seen: Array, window: Window, columns: int, covered: float = _COVERED
     nearer_last = np.argsort(seen[:, 2], kind="stable")
     nearer_last = nearer_last[inside[nearer_last]]
 
-    margin = int(_LARGEST)  # so that a disc at the edge needs no test
+    radius = _radius(len(seen), covered * rows * columns) if radius is None else radius
+    margin = int(radius)  # so that a disc at the edge needs no test
     canvas = np.full((rows + 2 * margin, columns + 2 * margin), -1, np.int32)
     wide = canvas.shape[1]
     middles = ((row + margin) * wide + column + margin)[nearer_last].astype(np.int64)
-    pixels = middles[:, None] + _disc(len(seen), covered * rows * columns) @ (1, wide)
+    pixels = middles[:, None] + _disc(radius) @ (1, wide)
     canvas.ravel()[pixels] = nearer_last[:, None]  # of equal pixels the last one stays
-    return canvas[margin:-margin, margin:-margin].copy()
+    return canvas[margin : margin + rows, margin : margin + columns].copy()
 
 
-def _shaded(clouds: Clouds, depth: Array) -> NDArray[np.uint32]:
+def _shaded(colors: Array, depth: Array) -> NDArray[np.uint32]:
     """Each point's colour, its four bytes as one number; paler the farther it is."""
-    colors = np.repeat([(*SOURCE_COLOR, 1.0), (*TARGET_COLOR, 1.0)], [len(cloud) for cloud in clouds], axis=0)
+    colors = np.concatenate([colors, np.ones((len(colors), 1))], axis=1)
     far, near = np.percentile(depth, (2, 98))
     fade = _FADE * np.clip((near - depth) / max(near - far, 1e-300), 0, 1)[:, None]
     bytes_of_each = (255 * (colors * (1 - fade) + fade)).astype(np.uint8)
     return np.asarray(bytes_of_each.view(np.uint32)).ravel()
 
 
-def _disc(points: int, pixels: float) -> NDArray[np.int64]:
-    """The offsets (M, 2) of one point's pixels, so that all points together have so many, within bounds."""
-    radius = np.clip(np.sqrt(pixels / (np.pi * points)), _SMALLEST, _LARGEST)
+def _radius(points: int, pixels: float) -> float:
+    """Of one point's disc, so that all points together have so many pixels, within bounds."""
+    return float(np.clip(np.sqrt(pixels / (np.pi * points)), _SMALLEST, _LARGEST))
+
+
+def _disc(radius: float) -> NDArray[np.int64]:
+    """The offsets (M, 2) of the pixels of a disc."""
     reach = np.arange(-int(radius), int(radius) + 1)
     offsets = np.stack(np.meshgrid(reach, reach), axis=-1).reshape(-1, 2)
     return np.asarray(offsets[np.sum(offsets**2, axis=1) <= radius**2])

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..clouds.cloud import PointCloud, as_points
-from ..errors import ArgumentError, missing_extra
+from ..errors import ArgumentError
 from ..motions import angles_between
-from ..whole_file import replacing
 from . import views
+from .figure_file import checked_path, new_figure, save
 from .painting import SOURCE_COLOR, TARGET_COLOR, Clouds, Window, paint, window_of
 
 if TYPE_CHECKING:
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Cloud = PointCloud | ArrayLike
 
-_SUFFIXES = (".png", ".svg", ".pdf")
 _MOST_POINTS = 60_000  # of each cloud: more would hide one behind the other
 _DPI = 160
 _FINER = 2  # pixels painted for each one shown: their mean is smooth
@@ -55,32 +54,21 @@ def before_and_after(
     upward = None if up is None else _checked(up, (3,), "up")
     if upward is not None and not upward.any():
         raise ArgumentError("up must be a direction, but is the zero vector")
-    before, fixed = _thinned(source, "source"), _thinned(target, "target")
+    before, fixed = thinned(source, "source"), thinned(target, "target")
     after = before @ T[:3, :3].T + T[:3, 3]
 
     vertical = views.upright(fixed) if upward is None else views.level(fixed, upward)
-    ahead = views.ahead(_viewpoint(target), fixed, vertical)
+    ahead = views.ahead(viewpoint(target), fixed, vertical)
     rows = {
         "from above": views.from_above(vertical, ahead),
         "at an angle": views.obliquely(vertical, ahead),
     }
-    below, fixed_below = _below_ceiling(after @ vertical, fixed @ vertical)
+    below, fixed_below = below_ceiling(after @ vertical, fixed @ vertical)
     columns = {
         "before": (before[below], fixed[fixed_below]),
         "after": (after[below], fixed[fixed_below]),
     }
-    _save(_figure(columns, rows, title or _motion(T, before, after)), path)
-    return path
-
-
-def checked_path(path: str | os.PathLike[str]) -> Path:
-    """The path, if a picture can be written there; raises ArgumentError for another suffix or a missing folder."""
-    path = Path(path)
-    if path.suffix.lower() not in _SUFFIXES:
-        raise ArgumentError(f"path must end in one of {', '.join(_SUFFIXES)}, but is {str(path)!r}")
-    if not path.parent.is_dir():
-        raise ArgumentError(f"path must lie in a folder that exists, but is {str(path)!r}")
-    return path
+    return save(_figure(columns, rows, title or _motion(T, before, after)), path)
 
 
 def _checked(values: ArrayLike, shape: tuple[int, ...], name: str) -> Array:
@@ -90,7 +78,7 @@ def _checked(values: ArrayLike, shape: tuple[int, ...], name: str) -> Array:
     return array
 
 
-def _thinned(cloud: Cloud, name: str) -> Array:
+def thinned(cloud: Cloud, name: str) -> Array:
     """At most _MOST_POINTS of the cloud's finite points, (N, 3), the same ones each time."""
     points = np.asarray(as_points(cloud.points if isinstance(cloud, PointCloud) else cloud, name), float)
     points = np.asarray(points[np.isfinite(points).all(axis=1)])
@@ -102,13 +90,13 @@ def _thinned(cloud: Cloud, name: str) -> Array:
     return points
 
 
-def _viewpoint(cloud: Cloud) -> Array:
+def viewpoint(cloud: Cloud) -> Array:
     """Where the sensor was, in the cloud's frame: its origin, if nothing else is known."""
     pose = cloud.viewpoint if isinstance(cloud, PointCloud) else None
     return np.zeros(3) if pose is None else np.asarray(pose[:3, 3])
 
 
-def _below_ceiling(source_heights: Array, target_heights: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def below_ceiling(source_heights: Array, target_heights: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Which points of each cloud, by their heights after the registration, to draw before and after it."""
     top = views.ceiling(np.concatenate([source_heights, target_heights]))
     return np.asarray(source_heights < top), np.asarray(target_heights < top)
@@ -123,7 +111,7 @@ def _motion(T: Array, before: Array, after: Array) -> str:
 
 def _figure(columns: dict[str, Clouds], rows: dict[str, Array], title: str) -> Figure:
     """A panel for each view (rows) of each pair of clouds (columns), with headings and a legend."""
-    windows = [_comparable([window_of(clouds, view) for clouds in columns.values()]) for view in rows.values()]
+    windows = [comparable([window_of(clouds, view) for clouds in columns.values()]) for view in rows.values()]
     heights = [_PANEL * row[0].height / row[0].width for row in windows]
     figure, grid = _panels(heights, len(columns))
     for panels, view, in_view in zip(grid, rows.values(), windows, strict=True):
@@ -141,7 +129,7 @@ def _figure(columns: dict[str, Clouds], rows: dict[str, Array], title: str) -> F
     return figure
 
 
-def _comparable(windows: list[Window]) -> list[Window]:
+def comparable(windows: list[Window]) -> list[Window]:
     """The windows in one shape, and in one scale unless a cloud would be lost in it (a far-off start)."""
     tallest, widest = max(w.height for w in windows), max(w.width for w in windows)
     shape = float(np.clip(tallest / widest, 0.45, 1.2))
@@ -153,10 +141,6 @@ def _comparable(windows: list[Window]) -> list[Window]:
 
 def _panels(heights: list[float], columns: int) -> tuple[Figure, NDArray[np.object_]]:
     """A figure with a grid of empty panels of these heights in inches."""
-    try:
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise missing_extra("viz", "drawing a picture") from error
     wide = _LEFT + (_PANEL + _GAP) * columns
     high = _TOP + sum(heights) + _GAP * (len(heights) - 1) + _BOTTOM
     spacing = {
@@ -168,7 +152,7 @@ def _panels(heights: list[float], columns: int) -> tuple[Figure, NDArray[np.obje
         "hspace": _GAP / (sum(heights) / len(heights)),
         "height_ratios": heights,
     }
-    figure = Figure(figsize=(wide, high), dpi=_DPI)
+    figure = new_figure(wide, high, _DPI)
     return figure, figure.subplots(len(heights), columns, squeeze=False, gridspec_kw=spacing)
 
 
@@ -182,8 +166,3 @@ def _add_legend(figure: Figure) -> None:
         for name, color in colors.items()
     ]
     figure.legend(handles=handles, loc="lower center", ncols=2, frameon=False, fontsize=14)
-
-
-def _save(figure: Figure, path: Path) -> None:
-    with replacing(path) as unfinished:
-        figure.savefig(unfinished, format=path.suffix[1:].lower())

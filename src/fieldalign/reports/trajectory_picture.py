@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import cycle
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import ArgumentError, missing_extra
+from ..errors import ArgumentError
 from ..evaluation.pose_error import PoseErrors
 from ..odometry.trajectory import Trajectory
-from ..whole_file import replacing
+from .figure_file import checked_path, save
 from .painting import SOURCE_COLOR, TARGET_COLOR
-from .picture import checked_path
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,6 +22,8 @@ if TYPE_CHECKING:
 
 _WIDTH, _ABOVE, _BELOW = 8.0, 6.0, 1.8  # inches: of all, and the heights of the view from above and of each curve
 _DPI = 160
+_SMALLEST = 0.7  # times the usual size of letters: those of 10 points become 7, which a column of print asks for
+_LOWEST = 0.9  # inches of a curve
 # Of Okabe and Ito, as the first and the truth's: told apart by every kind of colour vision.
 _COLORS = SOURCE_COLOR, (0.0, 0.62, 0.451), (0.8, 0.475, 0.655), (0.9, 0.624, 0.0)
 
@@ -47,12 +48,19 @@ def trajectories_picture(
     path: str | os.PathLike[str],
     truth: Trajectory | None = None,
     title: str | None = None,
+    *,
+    width: float = _WIDTH,
+    dpi: float | None = None,
 ) -> Path:
-    """Draw several trajectories in one picture, which calls them by their names; the rest as of trajectory_picture."""
+    """Draw several trajectories in one picture, which calls them by their names; the rest as of trajectory_picture.
+
+    width: in inches; in narrow figures, lines and letters are smaller, and no smaller than can be read. dpi: pixels in
+    one inch.
+    """
     path = checked_path(path)
     for trajectory in trajectories.values():
         _check(trajectory, truth)
-    figure, panels = _panels(1 if truth is None else 3)
+    figure, panels = _panels(1 if truth is None else 3, width, dpi or _DPI)
     _draw_ways(panels[0], panels[1], trajectories, truth)
     if truth is not None:
         _draw_errors(panels[2], panels[3], trajectories, truth)
@@ -60,9 +68,9 @@ def trajectories_picture(
     first = next(iter(trajectories.values()))
     title = title or f"{len(first)} poses over {first.distances[-1]:.4g} m"
     panels[0].set_title(title, fontsize=11, color="0.3", pad=10)
-    with replacing(path) as unfinished:
-        figure.savefig(unfinished, format=path.suffix[1:].lower())
-    return path
+    if width < _WIDTH:
+        _shrink(panels, max(width / _WIDTH, _SMALLEST))
+    return save(figure, path)
 
 
 def _check(trajectory: Trajectory, truth: Trajectory | None) -> None:
@@ -73,12 +81,8 @@ def _check(trajectory: Trajectory, truth: Trajectory | None) -> None:
                             f"{len(truth)}")
 
 
-def _panels(curves: int) -> tuple[Figure, list[Axes]]:
+def _panels(curves: int, width: float, dpi: float) -> tuple[Figure, list[Axes]]:
     """A figure with a large panel over so many low ones."""
-    try:
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise missing_extra("viz", "drawing a picture") from error
     heights = [_ABOVE] + [_BELOW] * curves
     figure = Figure(figsize=(_WIDTH, sum(heights)), dpi=_DPI, layout="constrained")
     panels = list(figure.subplots(len(heights), 1, gridspec_kw={"height_ratios": heights}))
@@ -87,6 +91,19 @@ def _panels(curves: int) -> tuple[Figure, list[Axes]]:
         axes.grid(color="0.92", linewidth=0.8)
         axes.set_axisbelow(True)
     return figure, panels
+
+
+def _shrink(panels: Sequence[Axes], scale: float) -> None:
+    """Letters and lines so many times as large."""
+    axes: Any
+    for axes in panels:
+        legend = axes.get_legend()
+        texts = [axes.title, axes.xaxis.label, axes.yaxis.label, *axes.get_xticklabels(), *axes.get_yticklabels()]
+        for text in texts + ([] if legend is None else legend.get_texts()):
+            text.set_fontsize(scale * text.get_fontsize())
+        axes.tick_params(labelsize=scale * 10, length=scale * 3.5, width=scale * 0.8)
+        for line in axes.get_lines():
+            line.set(linewidth=scale * line.get_linewidth(), markersize=scale * line.get_markersize())
 
 
 def _draw_ways(above: Axes, height: Axes, trajectories: Mapping[str, Trajectory], truth: Trajectory | None) -> None:

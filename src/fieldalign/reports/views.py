@@ -121,6 +121,16 @@ def obliquely(up: Array, ahead: Array) -> Array:
     return np.stack([right, np.cross(right, down), -down])
 
 
+def from_front(up: Array, ahead: Array) -> Array:
+    """The level view along `ahead`."""
+    return np.stack([np.cross(ahead, up), up, -ahead])
+
+
+def from_side(up: Array, ahead: Array) -> Array:
+    """The level view from the right of who looks along `ahead`."""
+    return np.stack([ahead, up, np.cross(ahead, up)])
+
+
 def sphere(count: int) -> Array:
     """Unit directions (count, 3), evenly over the sphere along a spiral."""
     z = 1 - (2 * np.arange(count) + 1) / count
