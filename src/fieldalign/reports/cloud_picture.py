@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..inspection import diverging_colors
 from . import views
 from .figure_file import checked_path, new_figure, save
-from .painting import SOURCE_COLOR, TARGET_COLOR, Array, Window, paint_points, window_of
+from .painting import FADE, SOURCE_COLOR, TARGET_COLOR, Array, Window, paint_points, window_of
 from .picture import comparable
 
 if TYPE_CHECKING:
@@ -88,11 +88,12 @@ def clouds_picture(
     windows = windows_of(columns, frame, sides)
     figure, grid, panel = _panels(columns, sides, [row[0].height / row[0].width for row in windows], style)
     radius = None if style.point_size is None else style.point_size / 144 * style.dpi * _FINER
+    fade = FADE if style.limit is None else 0.0  # colours that mean numbers stay what they are
     for row, side, in_view in zip(grid, sides, windows, strict=True):
         for axes, layers, window in zip(row, columns.values(), in_view, strict=True):
             points, colors = joined(layers)
             pixels = max(1, round(panel * style.dpi * _FINER))
-            image = paint_points(points, colors, VIEWS[side](*frame), window, pixels, radius)
+            image = paint_points(points, colors, VIEWS[side](*frame), window, pixels, radius, fade)
             axes.imshow(image, aspect="auto", interpolation="antialiased")
             axes.set(xticks=[], yticks=[])
             axes.spines[:].set(color="0.75", linewidth=0.5)
@@ -143,7 +144,7 @@ def _panels(
     left = style.line if len(sides) > 1 else 0.02
     right = _BAR if style.limit is not None else 0.02
     top = 0.02 + style.line * ((len(columns) > 1) + bool(style.title))
-    bottom = 0.02 + style.line * (_named(columns) is not None)
+    bottom = 0.02 + style.line * ((_named(columns) is not None) + 0.5 * (style.limit is not None))
     panel = (style.width - left - right - _GAP * (len(columns) - 1)) / len(columns)
     heights = [panel * shape for shape in shapes]
     high = top + sum(heights) + _GAP * (len(heights) - 1) + bottom

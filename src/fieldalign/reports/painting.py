@@ -19,7 +19,7 @@ Clouds = tuple[Array, Array]  # source and target, each (N, 3), in one frame
 SOURCE_COLOR = (0.835, 0.369, 0.0)
 TARGET_COLOR = (0.0, 0.447, 0.698)
 
-_FADE = 0.55  # how far towards white the farthest points go: a cloud of one colour looks flat without
+FADE = 0.55  # how far towards white the farthest points go: a cloud of one colour looks flat without
 _COVERED = 0.6  # share of the image that the points' discs would cover, side by side
 _SMALLEST, _LARGEST = 1.5, 9  # radius of such a disc in pixels
 
@@ -49,13 +49,14 @@ def paint(clouds: Clouds, view: Array, window: Window, columns: int) -> Image:
 
 
 def paint_points(
-    points: Array, colors: Array, view: Array, window: Window, columns: int, radius: float | None = None
+    points: Array, colors: Array, view: Array, window: Window, columns: int, radius: float | None = None,
+    fade: float = FADE,
 ) -> Image:
-    """The same of points (N, 3) in colors (N, 3), 0..1, which are paler the farther they are. radius: of a point's disc
-    in pixels; None: by how many there are."""
+    """The same of points (N, 3) in colors (N, 3), 0..1. radius: of a point's disc in pixels; None: by how many there
+    are. fade: how far towards white the farthest points go."""
     seen = points @ view.T
     point = visible(seen, window, columns, radius=radius)
-    shown = np.append(_shaded(colors, seen[:, 2]), np.uint32(2**32 - 1))  # the last one, white, is for -1
+    shown = np.append(_shaded(colors, seen[:, 2], fade), np.uint32(2**32 - 1))  # the last one, white, is for -1
     return np.ascontiguousarray(shown[point]).view(np.uint8).reshape(*point.shape, 4)
 
 
@@ -85,12 +86,12 @@ def visible(
     return canvas[margin : margin + rows, margin : margin + columns].copy()
 
 
-def _shaded(colors: Array, depth: Array) -> NDArray[np.uint32]:
+def _shaded(colors: Array, depth: Array, fade: float) -> NDArray[np.uint32]:
     """Each point's colour, its four bytes as one number; paler the farther it is."""
     colors = np.concatenate([colors, np.ones((len(colors), 1))], axis=1)
     far, near = np.percentile(depth, (2, 98))
-    fade = _FADE * np.clip((near - depth) / max(near - far, 1e-300), 0, 1)[:, None]
-    bytes_of_each = (255 * (colors * (1 - fade) + fade)).astype(np.uint8)
+    white = fade * np.clip((near - depth) / max(near - far, 1e-300), 0, 1)[:, None]
+    bytes_of_each = (255 * (colors * (1 - white) + white)).astype(np.uint8)
     return np.asarray(bytes_of_each.view(np.uint32)).ravel()
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import ArgumentError
 from ..evaluation.pose_error import PoseErrors
 from ..odometry.trajectory import Trajectory
-from .figure_file import checked_path, save
+from .figure_file import checked_path, new_figure, save
 from .painting import SOURCE_COLOR, TARGET_COLOR
 
 if TYPE_CHECKING:
@@ -83,8 +83,8 @@ def _check(trajectory: Trajectory, truth: Trajectory | None) -> None:
 
 def _panels(curves: int, width: float, dpi: float) -> tuple[Figure, list[Axes]]:
     """A figure with a large panel over so many low ones."""
-    heights = [_ABOVE] + [_BELOW] * curves
-    figure = Figure(figsize=(_WIDTH, sum(heights)), dpi=_DPI, layout="constrained")
+    heights = [_ABOVE * width / _WIDTH] + [max(_BELOW * width / _WIDTH, _LOWEST)] * curves
+    figure = new_figure(width, sum(heights), dpi, layout="constrained")
     panels = list(figure.subplots(len(heights), 1, gridspec_kw={"height_ratios": heights}))
     for axes in panels:
         axes.spines[["top", "right"]].set_visible(False)
