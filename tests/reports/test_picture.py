@@ -118,7 +118,7 @@ def test_failure_leaves_the_old_picture(pair, tmp_path, monkeypatch):
         raise OSError("disk full")
 
     monkeypatch.setattr(figure.Figure, "savefig", fail)
-    with pytest.raises(OSError, match="disk full"):
+    with pytest.raises(errors.ArgumentError, match=r"picture\.png cannot be written: disk full"):
         before_and_after(*pair, path)
     assert path.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [path]

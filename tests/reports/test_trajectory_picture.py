@@ -24,7 +24,7 @@ def drives(winding, monkeypatch):
 def panels(monkeypatch):
     """The panels of the picture that is drawn."""
     drawn, make = [], module._panels
-    monkeypatch.setattr(module, "_panels", lambda curves: drawn.extend((made := make(curves))[1]) or made)
+    monkeypatch.setattr(module, "_panels", lambda *how: drawn.extend((made := make(*how))[1]) or made)
     return drawn
 
 

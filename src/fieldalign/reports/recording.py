@@ -72,7 +72,8 @@ def _begin(title: str) -> tuple[Any, Any]:
         import rerun as rr
     except ImportError as error:
         raise missing_extra("rerun", "writing a recording for Rerun (.rrd)") from error
-    recording = rr.RecordingStream("fieldalign", recording_id=title)
+    recording = rr.RecordingStream("fieldalign")
+    recording.send_recording_name(title)
     recording.memory = recording.memory_recording()
     recording.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     return rr, recording
