@@ -62,7 +62,7 @@ def main(args: list[str] | None = None) -> None:
     """
     loudness.reset()
     try:
-        with _ended_by_sigterm(), _one_line_warnings():
+        with _ended_by_signals(), _one_line_warnings():
             status = cli.main(args=args, prog_name="fieldalign", standalone_mode=False)
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.format_message())
@@ -79,20 +79,30 @@ def main(args: list[str] | None = None) -> None:
 
 
 @contextmanager
-def _ended_by_sigterm() -> Iterator[None]:
-    """A SIGTERM ends the command in order, as Ctrl-C does: what it had begun to write is removed."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGTERM, _end)
+def _ended_by_signals() -> Iterator[None]:
+    """A SIGTERM ends the command as Ctrl-C does: what it had begun to write is removed. Whatever becomes of the
+    exception on its way (Python itself wraps some), the exit status names the signal."""
+    came = 0
+
+    def end(number: int, frame: object) -> NoReturn:
+        nonlocal came
+        came = number
+        raise KeyboardInterrupt
+
+    in_main = threading.current_thread() is threading.main_thread()
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM) if in_main}
+    before = {number: handler for number, handler in before.items() if handler != signal.SIG_IGN}
     try:
+        for number in before:
+            signal.signal(number, end)
         yield
+    except BaseException:
+        if came:
+            sys.exit(128 + came)
+        raise
     finally:
-        signal.signal(signal.SIGTERM, before)
-
-
-def _end(number: int, frame: object) -> NoReturn:
-    sys.exit(128 + number)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 @contextmanager
