@@ -38,11 +38,11 @@ class _Step:
     now: float
 
     def left(self, now: float) -> str:
-        """The time that is left, if it goes on as it did."""
+        """The time that is left, if it goes on as it did; nothing where that is over."""
         if not self.of or not self.finished:
             return ""
         left = (self.now - self.began) * (self.of - self.finished) / self.finished - (now - self.now)
-        return f", {_clock(max(left, 0.0))} left" if self.finished < self.of else ""
+        return f", {_clock(left)} left" if left > 0 else ""
 
     def position(self) -> str:
         """How many of how many."""
