@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import io
 import os
 import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from .errors import ArgumentError
 
@@ -30,9 +32,20 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 def write_text(text: str, path: str | os.PathLike[str]) -> Path:
     """Writes a file, whole or not at all; returns the path. Raises ArgumentError where it cannot be written."""
+    return _write(text.encode(), path)
+
+
+def write_figure(figure: Any, path: str | os.PathLike[str]) -> Path:
+    """Writes a figure of matplotlib in the format that the suffix names; otherwise as write_text."""
+    picture = io.BytesIO()  # matplotlib and its encoders come to harm in their own ways on a full disk
+    figure.savefig(picture, format=Path(path).suffix[1:].lower())
+    return _write(picture.getvalue(), path)
+
+
+def _write(content: bytes, path: str | os.PathLike[str]) -> Path:
     try:
         with replacing(path) as unfinished:
-            unfinished.write_text(text, encoding="utf-8", newline="")
+            unfinished.write_bytes(content)
     except OSError as error:
         raise ArgumentError(f"{path} cannot be written: {error.strerror or error}") from error
     return Path(path)

@@ -141,11 +141,12 @@ def test_trajectories_are_drawn(call, files):
 
 
 def test_a_disk_that_refuses_is_named_and_the_older_figure_stays(call, monkeypatch):
-    def refuse(figure, path, **_):
-        path.write_bytes(b"half")
+    def refuse(path, content):
+        with open(path, "wb") as file:
+            file.write(content[:100])
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr("matplotlib.figure.Figure.savefig", refuse)
+    monkeypatch.setattr("pathlib.Path.write_bytes", refuse)
     for arguments in (PAIR, ("plot", "way.txt")):
         with open("figure.pdf", "w") as file:
             file.write("older")

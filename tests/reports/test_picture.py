@@ -108,22 +108,6 @@ def test_clouds_of_any_kind_are_drawn_and_left_alone(pair, tmp_path):
     assert np.array_equal(target, copies[1])
 
 
-def test_failure_leaves_the_old_picture(pair, tmp_path, monkeypatch):
-    figure = pytest.importorskip("matplotlib.figure")
-    path = tmp_path / "picture.png"
-    path.write_bytes(b"old")
-
-    def fail(self, file, **keywords):
-        file.write_bytes(b"half")
-        raise OSError("disk full")
-
-    monkeypatch.setattr(figure.Figure, "savefig", fail)
-    with pytest.raises(errors.ArgumentError, match=r"picture\.png cannot be written: disk full"):
-        before_and_after(*pair, path)
-    assert path.read_bytes() == b"old"
-    assert list(tmp_path.iterdir()) == [path]
-
-
 def test_without_matplotlib_the_extra_is_named(pair, tmp_path, monkeypatch):
     for name in [name for name in sys.modules if name.split(".")[0] == "matplotlib"]:
         monkeypatch.delitem(sys.modules, name)

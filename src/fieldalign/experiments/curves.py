@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..motions import Matrix
-from ..reports.figure_file import save as save_figure
+from ..whole_file import write_figure
 from . import figures
 from .measures import share_interval
 from .results import Results
@@ -95,7 +95,7 @@ def save(figure: Figure, panels: list[Axes], path: Path) -> None:
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=1, frameon=False, fontsize=figures.SMALL,
                   labelcolor=figures.INK, handlelength=3.0, labelspacing=0.2, borderaxespad=0.2)
-    save_figure(figure, path)
+    write_figure(figure, path)
 
 
 def _allowed(errors: Matrix, smallest: float) -> Matrix:

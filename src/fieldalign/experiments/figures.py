@@ -13,6 +13,7 @@ from ..reports import figure_file
 from ..reports.painting import Image, Window
 from ..reports.shading import Layer, paint_surfaces
 from ..reports.views import sphere
+from ..whole_file import write_figure
 from .request import Report, Request
 from .results import head, write_json
 
@@ -118,7 +119,7 @@ def write_picture(
     """NAME.png, NAME.pdf, and NAME.json with what is shown; each whole or not at all."""
     path = request.output / name
     for suffix in (".png", ".pdf"):
-        figure_file.save(figure, path.with_suffix(suffix))
+        write_figure(figure, path.with_suffix(suffix))
     said = head(name, title, protocol, request.data, request.seed) | {"shown": shown}
     files = [path.with_suffix(".png"), path.with_suffix(".pdf"), write_json(said, path.with_suffix(".json"))]
     return Report("\n".join([title, *protocol]), files)

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..inspection import diverging_colors
+from ..whole_file import write_figure
 from . import views
-from .figure_file import checked_path, new_figure, save
+from .figure_file import checked_path, new_figure
 from .painting import FADE, SOURCE_COLOR, TARGET_COLOR, Array, Window, paint_points, window_of
 from .picture import comparable
 
@@ -98,7 +99,7 @@ def clouds_picture(
             axes.set(xticks=[], yticks=[])
             axes.spines[:].set(color="0.75", linewidth=0.5)
     _name(figure, grid, columns, sides, style)
-    return save(figure, path)
+    return write_figure(figure, path)
 
 
 def frame_of(points: Array, up: Array, eye: Array) -> Frame:

@@ -1,4 +1,4 @@
-"""Figures of matplotlib: one place makes them, and writes them whole or not at all, or says which file failed."""
+"""Where figures may be written, and how they begin; `whole_file.write_figure` writes them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from ..errors import ArgumentError, missing_extra
-from ..whole_file import replacing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,14 +31,3 @@ def new_figure(width: float, height: float, dpi: float, layout: Literal["constra
     except ImportError as error:
         raise missing_extra("viz", "drawing a picture") from error
     return Figure(figsize=(width, height), dpi=dpi, layout=layout)
-
-
-def save(figure: Figure, path: Path) -> Path:
-    """Writes a figure in the format of the suffix; an older file is replaced only when the new one is complete. Raises
-    ArgumentError that names the file where it cannot be written."""
-    try:
-        with replacing(path) as unfinished:
-            figure.savefig(unfinished, format=path.suffix[1:].lower())
-    except OSError as error:
-        raise ArgumentError(f"{path} cannot be written: {error.strerror or error}") from error
-    return path

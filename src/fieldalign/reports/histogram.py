@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..inspection import Deviation, diverging_colors
-from .figure_file import checked_path, new_figure, save
+from ..whole_file import write_figure
+from .figure_file import checked_path, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -40,7 +41,7 @@ def deviation_histogram(deviation: Deviation, path: str | os.PathLike[str], titl
     axes.set_xlabel("deviation, negative inside" if deviation.signed else "distance to the surface", color="0.3")
     axes.set_ylabel("points", color="0.3")
     axes.spines[["top", "right"]].set_visible(False)
-    return save(figure, path)
+    return write_figure(figure, path)
 
 
 def _draw_bars(axes: Axes, deviation: Deviation) -> None:

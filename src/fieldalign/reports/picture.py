@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from ..clouds.cloud import PointCloud, as_points
 from ..errors import ArgumentError
 from ..motions import angles_between
+from ..whole_file import write_figure
 from . import views
-from .figure_file import checked_path, new_figure, save
+from .figure_file import checked_path, new_figure
 from .painting import SOURCE_COLOR, TARGET_COLOR, Clouds, Window, paint, window_of
 
 if TYPE_CHECKING:
@@ -68,7 +69,7 @@ def before_and_after(
         "before": (before[below], fixed[fixed_below]),
         "after": (after[below], fixed[fixed_below]),
     }
-    return save(_figure(columns, rows, title or _motion(T, before, after)), path)
+    return write_figure(_figure(columns, rows, title or _motion(T, before, after)), path)
 
 
 def _checked(values: ArrayLike, shape: tuple[int, ...], name: str) -> Array:

@@ -13,7 +13,8 @@ import numpy as np
 from ..errors import ArgumentError
 from ..evaluation.pose_error import PoseErrors
 from ..odometry.trajectory import Trajectory
-from .figure_file import checked_path, new_figure, save
+from ..whole_file import write_figure
+from .figure_file import checked_path, new_figure
 from .painting import SOURCE_COLOR, TARGET_COLOR
 
 if TYPE_CHECKING:
@@ -70,7 +71,7 @@ def trajectories_picture(
     panels[0].set_title(title, fontsize=11, color="0.3", pad=10)
     if width < _WIDTH:
         _shrink(panels, max(width / _WIDTH, _SMALLEST))
-    return save(figure, path)
+    return write_figure(figure, path)
 
 
 def _check(trajectory: Trajectory, truth: Trajectory | None) -> None:
