@@ -51,7 +51,7 @@ class Width(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic
 @click.option("--truth", type=click.Path(), help="Of one trajectory: the true one, and draw the errors.")
 @click.option("--view", "views", type=click.Choice(_VIEWS), multiple=True,
               help="From where; several make several rows.  [default: oblique]")
-@click.option("--up", metavar="X,Y,Z", default="0,0,1", show_default=True, help="About upward, in the last frame.")
+@click.option("--up", metavar="X,Y,Z", help="About upward, in the last frame.  [default: z, or as a camera held it]")
 @click.option("--color", type=click.Choice(["cloud", "file", "distance"]), default="cloud", show_default=True,
               help="One colour a cloud; as the files have it; or by the distance of the first from the second.")
 @click.option("--limit", type=click.FloatRange(min=0, min_open=True),
@@ -63,8 +63,8 @@ class Width(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic
 @click.option("--title", default="", help="One line above.")
 def command(
     files: tuple[str, ...], output: str | None, pose: str | None, after_only: bool, poses: str | None,
-    truth: str | None, views: tuple[str, ...], up: str, color: str, limit: float | None, width: float, dpi: float,
-    point_size: float | None, title: str,
+    truth: str | None, views: tuple[str, ...], up: str | None, color: str, limit: float | None, width: float,
+    dpi: float, point_size: float | None, title: str,
 ) -> int:
     """Draw FILES: a cloud; SOURCE and TARGET, with --pose before and after it; scans with --poses; or trajectories
     (TUM, KITTI), with --truth and the errors.
@@ -94,8 +94,8 @@ def command(
             moved = None if pose is None else read_pose(pose, "--pose", scaled=True)
             placed = None if poses is None else read_poses(poses, files)
             drawn = plotted.Clouds(
-                files, moved, placed, before=not after_only, color=color, limit=limit, up=_direction(up),
-                sides=views or ("oblique",), title=title,
+                files, moved, placed, before=not after_only, color=color, limit=limit,
+                up=None if up is None else _direction(up), sides=views or ("oblique",), title=title,
             )
         stage()
         if output is None:

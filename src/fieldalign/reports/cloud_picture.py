@@ -102,9 +102,10 @@ def clouds_picture(
     return write_figure(figure, path)
 
 
-def frame_of(points: Array, up: Array, eye: Array) -> Frame:
-    """From where points (N, 3) are seen: levelled, about `up` (3,), and as from the sensor at `eye` (3,)."""
-    vertical = views.level(points, up)
+def frame_of(points: Array, up: Array | None, eye: Array) -> Frame:
+    """From where points (N, 3) are seen: levelled, about `up` (3,) or what they tell of it themselves, and as from the
+    sensor at `eye` (3,)."""
+    vertical = views.upright(points) if up is None else views.level(points, up)
     return Frame(vertical, views.ahead(eye, points, vertical))
 
 

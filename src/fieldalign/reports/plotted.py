@@ -59,12 +59,12 @@ class Clouds:
 
     pose: of two, T_target_source. poses: of any number, world_from_scan; those without one are left out. before: with
     a pose, also as they came. color: "cloud", "file" or "distance" (of the first from the second). limit: at which
-    distance colours are full. up: (3,). sides: of VIEWS.
+    distance colours are full. up: (3,), or None: as they tell. sides: of VIEWS.
     """
 
     def __init__(
         self, files: Sequence[str], pose: Matrix | None, poses: Sequence[Matrix | None] | None, *, before: bool,
-        color: str, limit: float | None, up: Sequence[float], sides: Sequence[str], title: str,
+        color: str, limit: float | None, up: Sequence[float] | None, sides: Sequence[str], title: str,
     ) -> None:
         _check(files, pose, poses, color, limit)
         self._title, self._sides, self._limit, self._signed = title, sides, limit, False
@@ -88,7 +88,7 @@ class Clouds:
                  for layer, T in zip(self._layers, self._poses, strict=True)]
         columns = {"before": self._layers, "after": after} if pose is not None and before else {"": after}
         everything = after[-1].points if len(files) == 2 and len(after[-1].points) else joined(after)[0]
-        self._frame = frame_of(everything, np.asarray(up), viewpoint(clouds[-1]))
+        self._frame = frame_of(everything, None if up is None else np.asarray(up), viewpoint(clouds[-1]))
         self._columns = without_ceiling(columns, self._frame.up)
 
     def draw(self, path: str, width: float, dpi: float, point_size: float | None) -> None:
