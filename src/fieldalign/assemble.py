@@ -78,7 +78,8 @@ def assemble(
     settings = told({"seed": seed, "dof": freedoms, "poses": [None if T is None else T.tolist() for T in given.poses],
                      "sigma": given.sigma, "fixed": given.fixed, "ordered": bool(ordered),
                      "sensor_at_origin": bool(sensor_at_origin)})
-    with Workshop(clouds, chosen, run_folder, settings, progress, used, bool(sensor_at_origin)) as shop:
+    with Workshop(clouds, chosen, run_folder, settings, progress, used, bool(sensor_at_origin),
+                  keeps_height=freedoms is not None and "z" not in freedoms.free) as shop:
         return build(shop, given, bool(ordered), freedoms, seed)
 
 

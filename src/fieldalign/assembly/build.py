@@ -13,13 +13,14 @@ from numpy.typing import NDArray
 from ..clock import Clock
 from ..dof import Dof
 from ..fields.protocol import Floats
-from ..motions import inverse, reach_of
+from ..motions import inverse
 from .assembly import Assembly
 from .choice import Choice, Pairs
 from .fused import fused
 from .graph import Graph
 from .joint import Pull
 from .looks import Look
+from .origins import Origins
 from .pair_result import PairResult
 from .pose_graph import Edge, linearised, optimise
 from .scan import read_scan
@@ -40,7 +41,8 @@ _MODEL = 0.25       # of a component's median voxel: the thinning of its model
 def build(shop: Workshop, given: Given, ordered: bool, dof: Dof | None, seed: int) -> Assembly:
     """The whole assembly."""
     clock = Clock()
-    lengths, places, broken = shop.thin()
+    lengths, places, origins, broken = shop.thin()
+    own, given = Origins(origins, given), given.seen_from(origins)
     clock.lap("read")
     known = np.array([k in lengths for k in range(len(shop.clouds))])
     graph = Graph(lengths, places, len(known), seed)
@@ -61,6 +63,7 @@ def build(shop: Workshop, given: Given, ordered: bool, dof: Dof | None, seed: in
     covariances: list[Any] = [None] * len(known)
     for members in graph.components:
         placed, known_by = _refined(shop, graph, members, given, dof)
+        placed = own.world(members) @ placed
         for row, scan in enumerate(members):
             poses[scan], covariances[scan] = placed[row], known_by[row]
     clock.lap("refine")
@@ -70,8 +73,9 @@ def build(shop: Workshop, given: Given, ordered: bool, dof: Dof | None, seed: in
         models.append(fused(members, lambda k: read_scan(shop.path(k)), poses, voxel, shop.threads))
     clock.lap("fuse")
     return Assembly(
-        poses, covariances, graph.components, graph.told(believed=True), graph.told(believed=False),
-        broken | graph.reasons_of([k for k in lengths if poses[k] is None]), len(choice.tried), clock.laps, models,
+        own.poses(poses), own.covariances(covariances), graph.components, own.pairs(graph.told(believed=True)),
+        own.pairs(graph.told(believed=False)), broken | graph.reasons_of([k for k in lengths if poses[k] is None]),
+        len(choice.tried), clock.laps, models,
     )
 
 
@@ -178,7 +182,6 @@ def _refined(
     edges = [replace(e, i=row[e.i], j=row[e.j]) for e in graph.believed(members)]
     world, poses, anchors = anchored(graph.poses[members], members, given, dof)
     poses = optimise(poses, edges, anchors)
-    reach = 2 * max(float(np.linalg.norm(edge.reference)) for edge in edges)
     for _ in range(_ROUNDS):
         system, known = anchors.system(poses), []
         for edge, pull in _pulled(shop, members, poses, edges):
@@ -187,13 +190,10 @@ def _refined(
             known += [edge] * (edge.i < edge.j)  # the reverse knows the same
         step = system.step()
         poses = anchors.moved(poses, step)
-        if max(reach_of(x, reach) for x in step) < _STILL * graph.unit:
+        if max(graph.moved(scan, x) for scan, x in zip(members, step, strict=True)) < _STILL * graph.unit:
             break
     covariances = linearised(poses, known, anchors).covariances()
-    poses = world @ poses
-    for scan in set(given.fixed) & set(members):
-        poses[row[scan]] = given.poses[scan]  # to the last bit
-    return poses, covariances
+    return world @ poses, covariances
 
 
 def _pulled(shop: Workshop, members: list[int], poses: Floats, edges: list[Edge]) -> list[tuple[Edge, Pull]]:

@@ -100,6 +100,10 @@ class Graph:
         inside = set(members)
         return [e for e, ok in self._judged() if ok and e.i in inside and e.j in inside]
 
+    def moved(self, scan: int, twist: Floats) -> float:
+        """How far a twist (6,) in its own frame moves what a scan shows, at most."""
+        return self._looks.moved(scan, twist)
+
     def guesses(self) -> Given:
         """The poses, as a guess for pairs within a component."""
         return Given(list(self.poses), None, (), is_rough=False)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..fields.protocol import Floats
-from ..motions import inverse
+from ..motions import inverse, reach_of
 
 _NEAR = 20         # scans around each one, of its part, that are looked at
 _AS_BEFORE = 0.1  # voxels: a pair that lies no further off lies where it was seen
@@ -57,6 +57,11 @@ class Looks:
         difference = laid.T_ij - T_ij
         shift = np.linalg.norm(difference[:3, :3] @ self.places[laid.j] + difference[:3, 3])
         return float(shift + turn * self.reach[laid.j]) / self.unit
+
+    def moved(self, scan: int, twist: Floats) -> float:
+        """How far a twist (6,) in its own frame moves what a scan shows, at most."""
+        about = np.r_[twist[:3], twist[3:] + np.cross(twist[:3], self.places[scan])]
+        return reach_of(about, 2 * float(self.reach[scan]))
 
     def placed(self, poses: Floats, scans: NDArray[np.int64] | int) -> Floats:
         """Where scans (m,) were taken from, in the frame of their poses (m, 4, 4)."""

@@ -159,7 +159,7 @@ def optimise(poses: Floats, edges: Sequence[Edge], anchors: Anchors) -> Floats:
 
 def doubt(chi_squared: float) -> float:
     """The weight of an edge whose error, squared, is so many variances."""
-    return float(1 / (1 + chi_squared / (6 * _DOUBT**2)) ** 2)
+    return float((1 + chi_squared / (6 * _DOUBT**2)) ** -2)
 
 
 def linearised(poses: Floats, edges: Sequence[Edge], anchors: Anchors) -> NormalEquations:

@@ -9,6 +9,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TypeAlias
 
+import numpy as np
+
 from ..fields.protocol import Floats
 from ..prepare import CloudLike
 from .executor import Executor
@@ -30,15 +32,15 @@ class Workshop:
     """Where the scans of an assembly lie, and the executor and the record of what is done with them.
 
     folder: of the run, which goes on where it ended; None: a temporary one. progress: called as progress(stage,
-    finished, of). sensor_at_origin: of scans that do not say where their sensor stood. Use `with`.
+    finished, of). sensor_at_origin, keeps_height: see scan.py. Use `with`.
     """
 
     def __init__(
         self, clouds: Sequence[CloudLike], executor: Executor, folder: Any, settings: Mapping[str, Any],
-        progress: Progress | None, threads: int, sensor_at_origin: bool = False,
+        progress: Progress | None, threads: int, sensor_at_origin: bool = False, keeps_height: bool = False,
     ) -> None:
         self.clouds, self.executor, self.threads = clouds, executor, threads
-        self._sensor_at_origin = sensor_at_origin
+        self._how = threads, sensor_at_origin, keeps_height
         self._progress = progress or (lambda stage, finished, of: None)
         with ExitStack() as opened:
             self._record = None
@@ -57,26 +59,26 @@ class Workshop:
     def __exit__(self, *error: object) -> None:
         self._opened.__exit__(*error)  # type: ignore[arg-type]
 
-    def thin(self) -> tuple[dict[int, tuple[float, float]], dict[int, Floats], dict[int, str]]:
-        """Thins each scan into a file. Voxel and extent, and where it was taken from (3,), of each that can be read,
-        and of the others why not."""
+    def thin(self) -> tuple[dict[int, tuple[float, float]], dict[int, Floats], Floats, dict[int, str]]:
+        """Thins each scan into a file. Voxel and extent, and where it was taken from (3,), of each that can be read;
+        the origins (n, 3) that they are seen from; and of the others why not."""
         missing = [k for k in range(len(self.clouds)) if not self.path(k).exists()]
         items = {}
         for k in missing:
             cloud, name = _absolute(self.clouds[k]), _called(self.clouds[k], k)
-            items[name_of(k)] = partial(thinned, cloud, name, self.threads, self._sensor_at_origin)
+            items[name_of(k)] = partial(thinned, cloud, name, *self._how)
         broken = {}
         for done in self._watched("reading", fetch, [Task(name, (name,), name) for name in items], items):
             if done.error is None:
                 write_scan(self.path(int(done.key)), done.value)
             else:
                 broken[int(done.key)] = done.error
-        lengths, places = {}, {}
+        lengths, places, origins = {}, {}, np.zeros((len(self.clouds), 3))
         for k in range(len(self.clouds)):
             if k not in broken:
                 scan = read_scan(self.path(k))
-                lengths[k], places[k] = (scan.voxel, scan.extent), scan.place
-        return lengths, places, dict(sorted(broken.items()))
+                lengths[k], places[k], origins[k] = (scan.voxel, scan.extent), scan.place, scan.origin
+        return lengths, places, origins, dict(sorted(broken.items()))
 
     def do(
         self, stage: str, function: Function, tasks: Iterable[Task], plain: Callable[[Any], Any] | None = None,

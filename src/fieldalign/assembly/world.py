@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..dof import Dof, allowed_poses
 from ..fields.protocol import Floats
-from ..motions import best_motion, inverse
+from ..motions import best_motion, inverse, translation
 from .pose_graph import Anchors
 
 _ROUGH_TURN = 0.5  # rad: of poses that are known no better, only the places are
@@ -29,6 +29,11 @@ class Given:
     def is_useful(self) -> bool:
         """Whether they tell which scans are near each other."""
         return sum(pose is not None for pose in self.poses) > len(self.poses) / 2
+
+    def seen_from(self, origins: Floats) -> Given:
+        """The same of scans that are seen from origins (n, 3) in their own frames."""
+        poses = [None if T is None else T @ translation(o) for T, o in zip(self.poses, origins, strict=True)]
+        return replace(self, poses=poses)
 
     def between(self, i: int, j: int) -> Floats | None:
         """A guess (4, 4) of the pose of scan j in the frame of scan i, if both are known well enough."""
