@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .arguments import check_positive
+from .clouds.checks import warn_of_lost_precision
 from .clouds.cloud import PointCloud, as_points
 from .clouds.files import read_cloud
 from .errors import ArgumentError
@@ -186,6 +187,7 @@ def _points_of(cloud: PointCloud | ArrayLike | str | os.PathLike[str]) -> NDArra
         raise ArgumentError(f"cloud must be finite, or NaN where nothing returned, but row {row} is {points[row]}")
     if np.isnan(points).any(axis=1).all():
         raise ArgumentError(f"cloud must have points, but none of its {len(points)} rows is one")
+    warn_of_lost_precision(points, np.array([np.nanmin(points, axis=0), np.nanmax(points, axis=0)]), "cloud")
     return points
 
 

@@ -38,13 +38,14 @@ def checked_points(values: ArrayLike, name: str, threads: int, drop_nan: bool = 
     if drop_nan and not np.isfinite(mean).all():
         points = without_missing(given, name, threads)
         bounds, mean = _core.survey(points, threads)
+    if np.isfinite(mean).all():
+        warn_of_lost_precision(points, bounds, name)  # first: it may be why points are not distinct
     _check_distinct(points, name)
     if not np.isfinite(mean).all():
         _raise_not_finite(points, name)
     largest = float(np.abs(bounds).max())
     if largest > LARGEST:
         raise ArgumentError(f"{name} must have coordinates below {LARGEST:g}, but has {largest:g}")
-    _warn_of_lost_precision(points, name, largest, float(np.ptp(bounds, axis=0).max()))
     return Checked(points, bounds, mean, len(given) - len(points))
 
 
@@ -75,10 +76,11 @@ def _check_distinct(points: NDArray[Any], name: str) -> None:
     raise ArgumentError(f"{name} must hold at least 3 distinct points, but holds {distinct} among {len(points)} rows")
 
 
-def _warn_of_lost_precision(points: NDArray[Any], name: str, largest: float, extent: float) -> None:
-    """float32 at UTM size has steps of half a metre: nothing can bring back what it lost."""
+def warn_of_lost_precision(points: NDArray[Any], bounds: NDArray[np.float64], name: str) -> None:
+    """float32 at UTM size has steps of half a metre: nothing can bring back what it lost. bounds: (2, 3), corners."""
+    largest, extent = float(np.abs(bounds).max(initial=0.0)), float(np.ptp(bounds, axis=0).max())
     step = largest * float(np.finfo(np.float32).eps)
-    if points.dtype == np.float32 and step > 1e-4 * extent:
+    if points.dtype == np.float32 and step > 1e-4 * extent and len(points) > 1:
         warnings.warn(
             f"{name} is float32 with coordinates up to {largest:.3g}: they are rounded to {step:.2g} over an extent of "
             f"{extent:.3g}; give float64 coordinates, or subtract an offset before rounding",

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from .. import _core
 from ..errors import ArgumentError
 from ..threads import resolve_threads
-from .checks import without_missing
+from .checks import warn_of_lost_precision, without_missing
 from .cloud import PointCloud, as_points
 
 
@@ -33,6 +33,7 @@ def thin(cloud: PointCloud | ArrayLike, voxel: float, *, threads: int | None = N
     if len(points) < len(given):
         given = given[~np.isnan(given.points).any(axis=1)]
     bounds, _ = _core.survey(points, cores)
+    warn_of_lost_precision(points, bounds, "cloud")
     try:
         means, first, _ = _core.thin(points, bounds, float(voxel), cores)
     except ValueError as error:

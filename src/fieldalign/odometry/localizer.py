@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..arguments import as_count
 from ..clock import Clock
+from ..clouds.checks import warn_of_lost_precision
 from ..clouds.cloud import PointCloud, as_points
 from ..clouds.files import read_cloud
 from ..errors import ArgumentError
@@ -223,4 +224,5 @@ def _as_map(map: PointCloud | ArrayLike | str | os.PathLike[str]) -> PointCloud:
     cloud = cloud[np.isfinite(cloud.points).all(axis=1)]
     if len(cloud) < _FEWEST:
         raise ArgumentError(f"map must have at least {_FEWEST} points, but has {len(cloud)}")
+    warn_of_lost_precision(cloud.points, np.array([cloud.points.min(axis=0), cloud.points.max(axis=0)]), "map")
     return cloud

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
+from ..errors import ArgumentError
 from ..scale import scale_of
 
 FEWEST = 5         # points of a plane
@@ -23,6 +24,7 @@ _ENOUGH = 0.75     # of the largest share of planes: at smaller voxels, most hol
 _SMOOTH = 40.0     # voxels to the planes' thickness, at least: the noise of a beam tilts planes that are short
 _FEWEST_POINTS = 100
 _RANGES = 1000     # points that the range is read from
+_AWAY = 100        # extents: no sensor looks at so little of its surroundings
 _FAR = 1.5         # of the range of nearly all points: what lies farther is no surface that will be seen again
 
 
@@ -35,13 +37,25 @@ class Measure:
 
 
 def measure_of(points: NDArray[Any], voxel: float | None) -> Measure | None:
-    """The lengths that a first scan (N, 3) tells; None where it has too few points to tell any."""
+    """The lengths that a first scan (N, 3) tells; None where it has too few points to tell any.
+
+    Raises ArgumentError for one that is in the coordinates of a map.
+    """
     seen = points[np.isfinite(points).all(axis=1) & (points != 0).any(axis=1)]
     if len(seen) < _FEWEST_POINTS or not np.ptp(seen, axis=0).any():
         return None
     seen = np.ascontiguousarray(seen)
+    _check_frame(seen)
     reach = range_of(seen)
     return Measure(voxel or natural_voxel(seen, reach), reach)
+
+
+def _check_frame(seen: NDArray[Any]) -> None:
+    bounds, middle = _core.survey(seen, 1)
+    away, extent = float(np.linalg.norm(middle)), float(np.linalg.norm(np.ptp(bounds, axis=0)))
+    if away > _AWAY * extent:
+        raise ArgumentError(f"cloud must be in the frame of its sensor, but lies {away:.3g} from its origin, over an "
+                            f"extent of {extent:.3g}")
 
 
 def natural_voxel(points: NDArray[Any], reach: float) -> float:
