@@ -19,7 +19,8 @@ if TYPE_CHECKING:  # loaded where processes are made: import fieldalign stays li
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing.connection import Connection
 
-_AHEAD = 2  # tasks away per process: one that it does, and one that waits for it
+_AHEAD = 2   # tasks away per process: one that it does, and one that waits for it
+_GONE = 0.2  # seconds from the first that a death shows to its last
 
 
 class Processes:
@@ -159,12 +160,20 @@ def _begin(watched: Connection, spool: _Spool) -> None:
     global _spool
     _spool = spool
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with, args=(watched,), daemon=True).start()
+    threading.Thread(target=_end_with, args=(watched, spool), daemon=True).start()
 
 
-def _end_with(watched: Connection) -> None:
-    """Nothing is ever sent: the pipe is readable when its other end is closed, by the run or by death."""
+def _end_with(watched: Connection, spool: _Spool) -> None:
+    """Nothing is ever sent: the pipe is readable when its other end is closed, by the run or by death. The dead leave
+    their temporary file, which may hold whole clouds."""
+    from multiprocessing import parent_process
+    from shutil import rmtree
+
     watched.poll(None)
+    if (parent := parent_process()) is not None:
+        parent.join(_GONE)
+        if not parent.is_alive():
+            rmtree(spool.path.parent, ignore_errors=True)
     os._exit(1)
 
 
