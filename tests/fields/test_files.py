@@ -466,16 +466,3 @@ def test_what_cannot_be_written_is_named(name, words, tmp_path):
     with pytest.raises(fa.CloudFileError, match=words):
         write_mesh(tmp_path / name, CORNERS, np.array(TRIANGLES))
     assert not list(tmp_path.iterdir())
-
-
-def test_a_failed_write_leaves_the_older_file(tmp_path, monkeypatch):
-    (tmp_path / "part.stl").write_text("old")
-
-    def fail(self, path):
-        path.write_bytes(b"half")
-        raise OSError("disk full")
-
-    monkeypatch.setattr(trimesh.Trimesh, "export", fail)
-    with pytest.raises(fa.CloudFileError, match=r"part\.stl cannot be written as .stl: disk full"):
-        write_mesh(tmp_path / "part.stl", CORNERS, np.array(TRIANGLES))
-    assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("part.stl", "old")]

@@ -5,14 +5,15 @@ from __future__ import annotations
 import os
 import pickle
 from collections.abc import Generator, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import TemporaryDirectory, gettempdir
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..arguments import as_count
 from ..errors import RunError
 from ..threads import resolve_threads
+from .record import naming_errors
 from .work import HERE, Done, Function, Items, Line, Results, Task, perform_away, sentence_of, unsendable
 
 if TYPE_CHECKING:  # loaded where processes are made: import fieldalign stays light
@@ -129,20 +130,22 @@ class _Spool(NamedTuple):
 
 @contextmanager
 def _spooled(items: Items) -> Iterator[_Spool]:
-    with TemporaryDirectory(prefix="fieldalign-") as folder:
-        places = {}
-        with open(Path(folder, "items"), "wb") as file:
-            for name, make in items.items():
-                places[name] = file.tell()
-                _write(file, name, make)
-        yield _Spool(Path(folder, "items"), places)
+    with ExitStack() as opened:
+        with naming_errors(Path(gettempdir(), "fieldalign")):
+            folder = opened.enter_context(TemporaryDirectory(prefix="fieldalign-"))
+            spool = _Spool(Path(folder, "items"), {})
+            with open(spool.path, "wb") as file:
+                for name, make in items.items():
+                    spool.places[name] = file.tell()
+                    _write(file, name, make)
+        yield spool
 
 
 def _write(file: Any, name: str, make: Any) -> None:
     try:
         pickle.dump(make, file, pickle.HIGHEST_PROTOCOL)
-    except OSError as error:
-        raise RunError(f"the temporary file {file.name} cannot be written: {error.strerror}") from error
+    except OSError:
+        raise
     except Exception as error:  # pickling raises anything
         raise unsendable(name, error) from error
 

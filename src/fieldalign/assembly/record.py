@@ -54,7 +54,7 @@ class RunRecord:
         self.done: dict[str, Any] = {}
         run = {"format": FORMAT, "version": __version__} | dict(run)
         with ExitStack() as opened:
-            with self._naming_errors():
+            with naming_errors(self.path):
                 self.path.parent.mkdir(parents=True, exist_ok=True)
                 opened.enter_context(only_one(self.path.with_name("lock")))
                 self._file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND | _BINARY, 0o666)
@@ -134,7 +134,7 @@ class RunRecord:
         """Adds a line, whole or not at all."""
         size = os.fstat(self._file).st_size
         rest = memoryview(_encoded(entry))
-        with self._naming_errors():
+        with naming_errors(self.path):
             try:
                 while rest:
                     rest = rest[os.write(self._file, rest):]
@@ -143,22 +143,23 @@ class RunRecord:
                 raise
 
     def _sync(self) -> None:
-        with self._naming_errors():
+        with naming_errors(self.path):
             os.fsync(self._file)
         self._synced = monotonic()
 
-    @contextmanager
-    def _naming_errors(self) -> Iterator[None]:
-        """Makes one clear error of what the system refuses."""
-        try:
-            yield
-        except OSError as error:
-            if error.errno in (errno.ENOSPC, errno.EDQUOT):
-                raise RunError(
-                    f"the disk of {self.path.parent} is full: what is recorded stays, and the run goes on from there "
-                    "when there is room"
-                ) from error
-            raise RunError(f"{self.path} cannot be written: {error.strerror or error}") from error
+
+@contextmanager
+def naming_errors(path: Path) -> Iterator[None]:
+    """Makes one clear RunError of what the system refuses when `path` is written."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno in (errno.ENOSPC, errno.EDQUOT):
+            raise RunError(
+                f"the disk of {path.parent} is full: what is recorded stays, and the run goes on from there "
+                "when there is room"
+            ) from error
+        raise RunError(f"{path} cannot be written: {error.strerror or error}") from error
 
 
 def _plain(value: Mapping[str, Any]) -> dict[str, Any]:

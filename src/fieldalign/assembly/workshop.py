@@ -15,7 +15,7 @@ from ..fields.protocol import Floats
 from ..prepare import CloudLike
 from .executor import Executor
 from .identity import identity_of
-from .record import RunRecord
+from .record import RunRecord, naming_errors
 from .scan import read_scan, thinned, write_scan
 from .stages import fetch
 from .work import Done, Function, Task
@@ -45,12 +45,14 @@ class Workshop:
         with ExitStack() as opened:
             self._record = None
             if folder is None:
-                folder = opened.enter_context(tempfile.TemporaryDirectory(prefix="fieldalign-"))
+                with naming_errors(Path(tempfile.gettempdir(), "fieldalign")):
+                    folder = opened.enter_context(tempfile.TemporaryDirectory(prefix="fieldalign-"))
             else:
                 identities = {name_of(k): identity_of(cloud, f"clouds[{k}]") for k, cloud in enumerate(clouds)}
                 self._record = opened.enter_context(RunRecord(folder, settings, identities))
             self._scans = Path(folder, "scans")
-            self._scans.mkdir(exist_ok=True)
+            with naming_errors(self._scans):
+                self._scans.mkdir(exist_ok=True)
             self._opened = opened.pop_all()
 
     def __enter__(self) -> Workshop:
@@ -70,7 +72,8 @@ class Workshop:
         broken = {}
         for done in self._watched("reading", fetch, [Task(name, (name,), name) for name in items], items):
             if done.error is None:
-                write_scan(self.path(int(done.key)), done.value)
+                with naming_errors(path := self.path(int(done.key))):
+                    write_scan(path, done.value)
             else:
                 broken[int(done.key)] = done.error
         lengths, places, origins = {}, {}, np.zeros((len(self.clouds), 3))

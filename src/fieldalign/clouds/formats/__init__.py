@@ -5,7 +5,12 @@ file's name; whatever else a library raises, files.py turns into a CloudFileErro
 format has no place for.
 """
 
+from __future__ import annotations
+
+from typing import BinaryIO
+
 from ...errors import CloudFileError
+from ..cloud import Array
 
 
 def require_bytes(needed: int, present: int, promise: str) -> None:
@@ -14,3 +19,9 @@ def require_bytes(needed: int, present: int, promise: str) -> None:
         raise CloudFileError(
             f"promises {promise}, at least {needed} bytes, but holds only {max(present, 0)} bytes of data"
         )
+
+
+def write_rows(file: BinaryIO, rows: Array) -> None:
+    """Writes the bytes of rows (n, ...), C-contiguous. Not rows.tofile(file): of what cannot be written when the C
+    library empties its buffer, at the end, NumPy says nothing, and on a full disk a file would lack its last bytes."""
+    file.write(rows.view("u1").data)

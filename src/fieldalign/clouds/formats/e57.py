@@ -54,7 +54,8 @@ def write(path: Path, cloud: PointCloud) -> list[str]:
     try:
         _write_scan(file, _as_stored(columns), cloud.viewpoint)
     finally:
-        file.close()
+        # Taken from it, or its end would close the image again, and tell on stderr what is raised here.
+        vars(file).pop("image_file").close()
     alpha = ["alpha of the colors"] if "alpha" in unnamed else []
     return alpha + parts_beyond(cloud, "normals", "times", "intensity", "colors", "viewpoint")
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...errors import CloudFileError
 from ..cloud import PointCloud
+from . import write_rows
 from .columns import parts_beyond
 
 FARTHEST = 1e9  # A format without a header is told from foreign bytes by values that no scanner measures.
@@ -32,7 +33,8 @@ def write(path: Path, cloud: PointCloud) -> list[str]:
     rows[:, :3] = cloud.points
     if cloud.intensity is not None:
         rows[:, 3] = cloud.intensity
-    rows.tofile(path)
+    with path.open("wb") as file:
+        write_rows(file, rows)
     exact = np.array_equal(rows[:, :3], cloud.points, equal_nan=True)
     return [
         *([] if exact else ["the digits of the points beyond float32"]),

@@ -7,7 +7,8 @@ import zipfile
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import IO, Any, NamedTuple
+from types import SimpleNamespace
+from typing import IO, Any, NamedTuple, cast
 
 import numpy as np
 
@@ -41,7 +42,7 @@ def read_npy(path: Path) -> PointCloud:
 def write_npy(path: Path, cloud: PointCloud) -> list[str]:
     """The points only, as (N, 3)."""
     with path.open("wb") as file:
-        np.save(file, cloud.points)
+        np.save(cast(IO[bytes], SimpleNamespace(write=file.write)), cloud.points)  # see write_rows()
     return parts_beyond(cloud)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...errors import CloudFileError
 from ..cloud import Array, PointCloud
-from . import require_bytes
+from . import require_bytes, write_rows
 from .columns import cloud_from_columns, columns_of
 
 ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
@@ -105,7 +105,7 @@ def write(path: Path, cloud: PointCloud) -> list[str]:
     lines += [f"property {NAMES[values.dtype.str[1:]]} {name}" for name, values in columns.items()]
     with path.open("wb") as file:
         file.write("\n".join([*lines, "end_header", ""]).encode())
-        rows.tofile(file)
+        write_rows(file, rows)
     return left_out
 
 
