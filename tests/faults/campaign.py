@@ -37,8 +37,8 @@ from fieldalign.motions import exp_twist
 SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGKILL
 PATIENCE = 20.0  # seconds in which a command that is told to end does so, and all its workers
 WIDE = 200, 110  # degrees
-TIMED = {"seconds", "cpu_seconds", "seconds_total", "seconds_a_frame", "seconds_a_frame_by_stage", "read", "step", "cpu",
-         "date", "measures"}
+TIMED = {"seconds", "cpu_seconds", "seconds_total", "seconds_a_frame", "seconds_a_frame_by_stage", "read", "step",
+         "cpu", "date", "measures"}
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ def make_data(folder: Path) -> None:
     (folder / "shapes" / "gt_poses.csv").write_text("0.5,0.2,-0.3,0.1,0.4,-0.2\n-0.1,0.6,0.2,0.3,0,0.1\n")
 
 
-# ------------------------------------------------------------------------------------------------------- what is written
+# -------------------------------------------------------------------------------------------------- what is written
 
 
 def plain(path: Path) -> Any:
@@ -129,7 +129,7 @@ def check_record(path: Path) -> int:
     return max(0, len(lines) - 1)
 
 
-# ---------------------------------------------------------------------------------------------------------------- killing
+# ----------------------------------------------------------------------------------------------------------- killing
 
 
 @dataclass
@@ -138,11 +138,18 @@ class Tally:
 
     kills: Counter[str] = field(default_factory=Counter)
     runs: int = 0
-    faults: list[str] = field(default_factory=list)
     statuses: Counter[str] = field(default_factory=Counter)
     slowest_end: float = 0.0
     slowest_orphan: float = 0.0
     left: Counter[str] = field(default_factory=Counter)
+
+    def to_dict(self) -> dict[str, Any]:
+        return {
+            "kills": dict(self.kills), "runs": self.runs, "statuses": dict(sorted(self.statuses.items())),
+            "seconds until the command had ended, at most": round(self.slowest_end, 2),
+            "seconds until its workers had, at most": round(self.slowest_orphan, 2),
+            "temporary files left": dict(self.left),
+        }
 
 
 class Chain:
@@ -266,23 +273,23 @@ def main() -> None:
     parser.add_argument("--output", type=Path)
     parser.add_argument("--only", choices=VICTIMS)
     asked = parser.parse_args()
-    told, began = {}, time.monotonic()
     names = [asked.only] if asked.only else list(VICTIMS)
+    told, began = {}, time.monotonic()
     with TemporaryDirectory(prefix="faults-") as folder:
-        make_data(Path(folder, "data"))
+        make_data(data := Path(folder, "data"))
         for k, name in enumerate(names):
-            share = asked.kills // len(names) + (k < asked.kills % len(names))
-            rng = np.random.default_rng([asked.seed, k])
-            tally = disturb(name, Path(folder, "data"), Path(folder, str(k)), share, rng, lambda text: print(text, flush=True))
-            told[name] = {"kills": dict(tally.kills), "statuses": dict(sorted(tally.statuses.items())),
-                          "seconds until the command had ended": round(tally.slowest_end, 2),
-                          "seconds until its workers had": round(tally.slowest_orphan, 2),
-                          "temporary files left": dict(tally.left)}
-            print(json.dumps(told[name]), flush=True)
-    report = {"seed": asked.seed, "kills": sum(sum(t["kills"].values()) for t in told.values()),
-              "seconds": round(time.monotonic() - began), "commands": told}
+            kills = asked.kills // len(names) + (k < asked.kills % len(names))
+            tally = disturb(name, data, Path(folder, str(k)), kills, np.random.default_rng([asked.seed, k]), tell)
+            told[name] = tally.to_dict()
+            tell(json.dumps(told[name]))
+    report = {"seed": asked.seed, "kills": asked.kills, "seconds": round(time.monotonic() - began), "commands": told}
     if asked.output:
         asked.output.write_text(json.dumps(report, indent=1) + "\n")
+
+
+def tell(text: str) -> None:
+    sys.stdout.write(text + "\n")
+    sys.stdout.flush()
 
 
 if __name__ == "__main__":
