@@ -167,10 +167,28 @@ def test_a_run_goes_on_where_it_ended(tmp_path, scans, serial):
     results = fa.register_many(scans, run_folder=tmp_path / "run", progress=lambda *numbers: told.append(numbers))
     assert bits(some) == bits(serial[:3])
     assert bits(results) == bits(serial)
-    assert told == [(0, 3), (1, 3), (2, 3), (3, 3)]
+    assert told == [(k, 4) for k in range(5)]  # three more, and the one that had failed
+    assert len(lines_of(tmp_path / "run")) == (1 + 3) + (1 + 4)  # each with the scans that it brought
     again = fa.register_many(scans, run_folder=tmp_path / "run", progress=lambda *numbers: told.append(numbers))
     assert bits(again) == bits(serial)
-    assert len(told) == 4
+    assert told[5:] == [(k, 2) for k in range(3)]
+
+
+def test_a_pair_that_failed_is_tried_again(tmp_path, scans, serial):
+    """Its scan was out of reach for a while."""
+    path, away = Path(scans[0][0]), tmp_path / "away"
+    fa.write_cloud(tmp_path / "0.ply", fa.read_cloud(path))
+    pairs = [(str(tmp_path / "0.ply"), scans[0][1])]
+
+    def vanishes(finished, of):
+        if finished == 0:
+            (tmp_path / "0.ply").rename(away)
+
+    failed = fa.register_many(pairs, run_folder=tmp_path / "run", progress=vanishes)
+    assert "does not exist" in failed[0].error
+    away.rename(tmp_path / "0.ply")
+    assert fa.register_many(pairs, run_folder=tmp_path / "run")[0].T_target_source.tobytes() == (
+        serial[0].T_target_source.tobytes())
 
 
 def test_other_settings_and_changed_scans_are_one_clear_error(tmp_path):
@@ -221,8 +239,9 @@ def test_a_client_that_is_killed_goes_on(tmp_path, scans, serial):
         time.sleep(0.02)
     client.kill()
     client.wait()
-    recorded, told = len(lines_of(tmp_path)) - 1, []
+    before, told = lines_of(tmp_path), []
+    recorded = [line for line in before if '"error":null' in line]
     results = fa.register_many(scans, run_folder=tmp_path, progress=lambda *numbers: told.append(numbers))
     assert bits(results) == bits(serial)
-    assert told[0] == (0, len(scans) - recorded)
-    assert len(lines_of(tmp_path)) == 1 + len(scans)
+    assert told[0] == (0, len(scans) - len(recorded))
+    assert len(lines_of(tmp_path)) == len(before) + len(scans) - len(recorded)

@@ -45,7 +45,8 @@ def register_many(
         scheduler there, whose workers must see the paths (other clouds are sent to them once). Or an executor
         (fieldalign.assembly.executor). Where it runs changes no bit of a result.
     run_folder: a folder in which each result is recorded at once; a run that was interrupted, however, goes on from
-        there. It holds one run: the same settings, unchanged scans; pairs may be added.
+        there. It holds one run: the same settings, unchanged scans; pairs may be added. A pair that failed is tried
+        again: its file may have been out of reach, or its worker out of memory.
     progress: called as progress(finished, of) after each pair that had to be registered, and first with finished = 0.
     threads: of each registration; None: so many that the machine is busy but not crowded.
     The others are those of `fa.register`, for all pairs alike.
@@ -73,7 +74,8 @@ def register_many(
         record = None
         if run_folder is not None:
             record = opened.enter_context(RunRecord(run_folder, told(options), wanted.identities()))
-            found = {key: PairResult.from_dict(record.done[key]) for key in wanted.tasks if key in record.done}
+            known = {key: PairResult.from_dict(record.done[key]) for key in wanted.tasks if key in record.done}
+            found = {key: result for key, result in known.items() if result.error is None}
         missing = [task for key, task in wanted.tasks.items() if key not in found]
         if missing:  # else no worker need start
             items = wanted.items(used, options["drop_nonfinite"])

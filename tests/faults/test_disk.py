@@ -11,6 +11,7 @@ from fieldalign.evaluation import evaluate
 from fieldalign.experiments.results import write_json
 from fieldalign.fields.files import write_mesh
 from fieldalign.motions import exp_twist
+from fieldalign.odometry import drive
 
 RNG = np.random.default_rng(0)
 POINTS = RNG.normal(size=(400, 3)) * [1, 0.8, 0.3]
@@ -118,6 +119,20 @@ def test_a_run_without_room_is_one_clear_error_and_goes_on_when_there_is(tmp_pat
     with full(room), pytest.raises(fa.RunError, match=r"full|cannot be written"):
         RUNS[name](clouds, tmp_path / "run")
     assert str(RUNS[name](clouds, tmp_path / "run")) == str(RUNS[name](clouds, None))
+
+
+@pytest.mark.parametrize("room", [0, 1000, 3000])
+def test_a_drive_keeps_all_lines_for_which_there_was_room(tmp_path, full, room):
+    (tmp_path / "drive").mkdir()
+    for k in range(12):
+        fa.write_cloud(tmp_path / "drive" / f"{k:02}.ply", POINTS + [0.01 * k, 0, 0])
+    frames = fa.read_sequence(tmp_path / "drive")
+    with full(room), pytest.raises(fa.RunError, match="cannot be written"):
+        drive.run(frames, fa.Odometry(), tmp_path / "out")
+    lines = (tmp_path / "out" / "trajectory_kitti.txt").read_bytes().splitlines(keepends=True)
+    assert all(line.endswith(b"\n") and len(line.split()) == 12 for line in lines)
+    assert bool(lines) == (room > 0)
+    assert "summary.json" not in os.listdir(tmp_path / "out")
 
 
 @pytest.mark.parametrize("name", RUNS)

@@ -101,7 +101,7 @@ def write(path: Path, vertices: NDArray[np.float64], faces: Triangles) -> None:
     if path.suffix.lower() == ".ply":
         _write_ply(path, vertices, faces)
     else:
-        content = trimesh.Trimesh(vertices, faces, process=False).export(file_type=path.suffix[1:].lower())
+        content: Any = trimesh.Trimesh(vertices, faces, process=False).export(file_type=path.suffix[1:].lower())
         path.write_bytes(content.encode() if isinstance(content, str) else content)
 
 
