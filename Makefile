@@ -5,7 +5,8 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 SOURCES := $(shell find src cpp -name '*.py' -o -name '*.hpp' -o -name '*.cpp' -o -name '*.pyi') CMakeLists.txt pyproject.toml
 
-.PHONY: demo test docs lint bench-paper bench-any-pose bench-verdict bench-fields bench-assemble bench-odometry experiments wheels clean
+.PHONY: demo test docs lint bench-paper bench-any-pose bench-verdict bench-fields bench-assemble bench-odometry bench-faults bench-load \
+	experiments wheels clean
 
 demo: $(VENV)/.installed-viz      ## simulate two scans of a room, register them, compare with the truth
 	$(BIN)/fieldalign demo --output demo
@@ -45,6 +46,12 @@ bench-odometry:                   ## real frames, simulated drives, endurance an
 
 EXPERIMENTS := modelnet40 shapenet success-rate efficiency density noise 3dmatch kitti kitti-trajectory ablation \
 	distance-field pseudo-sets data-examples
+
+bench-faults: $(VENV)/.installed-test  ## 240 kills at random moments of long commands; a quarter of an hour
+	$(BIN)/python tests/faults/campaign.py --kills 240 --output docs/benchmarks/faults.json
+
+bench-load: $(VENV)/.installed-test  ## 10,000 registrations, 100 threads, 50 million points; needs 6 GB; a quarter of an hour
+	$(BIN)/python benchmarks/load.py --output docs/benchmarks
 
 experiments:                      ## the paper's experiments on ../shared/data, beside the peers; half an hour
 	$(MAKE) VENV=$(VENV)-bench $(VENV)-bench/.installed-bench
