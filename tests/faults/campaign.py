@@ -35,7 +35,7 @@ from fieldalign.clouds.simulated import simulate_room
 from fieldalign.motions import exp_twist
 
 SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGKILL
-PATIENCE = 20.0  # seconds in which a command that is told to end does so, and all its workers
+PATIENCE = 60.0  # seconds in which a command that is told to end does so, and all its workers
 WIDE = 200, 110  # degrees
 TIMED = {"seconds", "cpu_seconds", "seconds_total", "seconds_a_frame", "seconds_a_frame_by_stage", "read", "step",
          "cpu", "date", "measures"}
