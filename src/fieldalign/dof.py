@@ -72,11 +72,22 @@ class Dof:
     def about(self, place: Floats) -> Dof:
         """The same freedoms about a place (3,) of the target, where the centre makes no difference: without turns, or
         with one, and shifts across its axis. So a centre that is far away, as the origin of UTM is, loses no digits."""
+        return Dof(self.free, self.axis, place) if self.is_anywhere else self
+
+    def between(self, guess: Floats, place: Floats, onto: Floats) -> Floats:
+        """The guess (4, 4), shifted so that it lays a place (3,) of the source on one of the target as far as shifts
+        are free, where that makes no difference to what is allowed: no motion from there is long then."""
+        if not self.is_anywhere:
+            return guess
+        axes = self.frame[:3, :3]
+        way = onto - (guess[:3, :3] @ place + guess[:3, 3])
+        return translation(axes @ (self.mask[3:] * (axes.T @ way))) @ guess
+
+    @property
+    def is_anywhere(self) -> bool:
+        """Whether the centre makes no difference: there are no turns, or one, and shifts across its axis are free."""
         turns, shifts = self.mask[:3], self.mask[3:]
-        across = np.flatnonzero(turns == 0)
-        if turns.sum() > 1 or (turns.any() and not shifts[across].all()):
-            return self
-        return Dof(self.free, self.axis, place)
+        return bool(turns.sum() <= 1 and (not turns.any() or shifts[turns == 0].all()))
 
     @property
     def mask(self) -> Floats:
@@ -159,8 +170,9 @@ def allowed_poses(
 ) -> Allowed:
     """The allowed among poses that take one cloud's frame, moved so that `moving` (3,) is its origin, into the other's,
     whose origin is then `held` (3,). guess: T_target_source (4, 4), None: the identity."""
-    frame = dof.about(held if target_is_held else moving).frame
-    guess = np.eye(4) if guess is None else guess
+    source, target = (moving, held) if target_is_held else (held, moving)
+    frame = dof.about(target).frame
+    guess = dof.between(np.eye(4) if guess is None else guess, source, target)
     left, right = translation(held), translation(-moving)
     if target_is_held:
         return Allowed(dof, inverse(frame) @ left, right @ inverse(guess) @ frame, inverted=False)
