@@ -212,7 +212,7 @@ class Chain:
         left = [path for path in self.folder.rglob("*") if path.name.startswith(".") or path.parent.name == "tmp"
                 if path.name != "dask-scratch-space"]  # where Dask always leaves it
         tally.left[number.name] += len(left)
-        assert number != signal.SIGINT or not left, f"left after {number.name}: {left}"
+        assert number == signal.SIGKILL or not left, f"left after {number.name}: {left}"
         for path in left:
             shutil.rmtree(path) if path.is_dir() else path.unlink()
         for name, path in outputs(self.folder).items():
