@@ -1,6 +1,8 @@
 """Disks that are full, folders that may not be written, files that vanish: one clear error, and no half of a file."""
 
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -90,6 +92,18 @@ def test_a_folder_that_may_not_be_written_is_one_clear_error(read_only, as_nobod
     with as_nobody(read_only), pytest.raises(fa.FieldalignError, match="cannot be written"):
         write(name, path)
     assert os.listdir(read_only) == [name]
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no disk that is always full")
+def test_a_full_disk_behind_stdout_is_one_line(tmp_path):
+    fa.write_cloud(tmp_path / "cloud.ply", POINTS)
+    paths = os.pathsep.join([str(Path(fa.__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])])
+    command = [sys.executable, "-m", "fieldalign", "register", "cloud.ply", "cloud.ply", "--json", "-"]
+    with open("/dev/full", "wb") as stdout:
+        ended = subprocess.run(command, cwd=tmp_path, env=os.environ | {"PYTHONPATH": paths}, stdout=stdout,
+                               stderr=subprocess.PIPE, text=True, check=False)
+    assert ended.returncode == 1
+    assert ended.stderr == "Error: the output cannot be written: No space left on device\n"
 
 
 # ------------------------------------------------------------------------------------------------------ whole runs

@@ -73,6 +73,8 @@ def main(args: list[str] | None = None) -> None:
         if loudness.is_verbose():
             traceback.print_exc()
         _fail(str(error))
+    except OSError as error:  # of stdout, with a full disk behind it, or of a file of which nothing else is known
+        _fail(f"{error.filename or 'the output cannot be written'}: {error.strerror or error}")
     except (click.Abort, KeyboardInterrupt):
         sys.exit(128 + signal.SIGINT)
     sys.exit(status or 0)
