@@ -80,8 +80,9 @@ def test_whatever_the_environment_says_and_after_a_fork(everything, alone):
 
 
 def test_nothing_reads_the_environment():
-    """But for what hands numbers of threads on to other people's libraries while they are measured."""
+    """But for the colours of a terminal, and for what tells other people's libraries their threads while they are
+    measured."""
     package = Path(fa.__file__).parent
     reads = {path.relative_to(package).as_posix() for path in package.rglob("*.py")
              if "os.environ" in (text := path.read_text()) or "getenv" in text}
-    assert reads == {"experiments/alone.py", "experiments/columns.py"}
+    assert reads == {"cli/plot.py", "experiments/alone.py", "experiments/columns.py"}
