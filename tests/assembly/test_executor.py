@@ -177,3 +177,15 @@ def test_a_suspect_goes_alone():
     assert list(line.away) == ["1"]
     line.back("1")
     assert [task.key for task in line.ready() if not line.away.update({task.key: task})] == ["3", "4", "5"]
+
+
+def test_a_cluster_of_this_machine_listens_to_no_other(jobs):
+    """Whoever reaches its scheduler may run code on its workers; its dashboard shows what they do."""
+    pytest.importorskip("distributed")
+    psutil = pytest.importorskip("psutil")
+    with closing(Dask("local", 1).run(jobs.waits, numbered(2), {})) as work:
+        next(work)
+        family = [psutil.Process(), *psutil.Process().children(recursive=True)]
+        listening = [c.laddr for p in family for c in p.net_connections("inet") if c.status == psutil.CONN_LISTEN]
+    assert len(listening) >= 4  # the scheduler, its dashboard, a worker, its nanny
+    assert {address.ip for address in listening} == {"127.0.0.1"}

@@ -19,6 +19,7 @@ _AHEAD = 4         # tasks away per thread of the cluster
 _LEAST = 16        # tasks away, before it has any
 _ASKED = 5.0       # seconds after which the cluster is asked again how large it is
 _PATIENCE = 10     # seconds to wait for a scheduler
+_HERE = "127.0.0.1"
 _DATA = 64 * 1024  # bytes: what pickles to more is data, and no mere path
 
 
@@ -63,7 +64,8 @@ class Dask:
             return
         with (
             # A death is judged here (work.Line), where a suspect goes again alone.
-            LocalCluster(n_workers=self.workers, threads_per_worker=1, dashboard_address=":0",
+            # Whoever reaches a scheduler may run code on its workers: nothing of it listens to other machines.
+            LocalCluster(n_workers=self.workers, threads_per_worker=1, host=_HERE, dashboard_address=f"{_HERE}:0",
                          silence_logs=logging.CRITICAL, scheduler_kwargs={"allowed_failures": 0}) as cluster,
             Client(cluster, set_as_default=False) as client,
         ):
