@@ -54,8 +54,10 @@ def read_poses(path: str, scans: Sequence[str]) -> list[Any]:
 def _from_file(path: Path) -> Any:
     import numpy as np
 
+    from ..clouds.formats.numpy import load_npy
+
     if path.suffix == ".npy":
-        return np.load(path, allow_pickle=False)
+        return load_npy(path)
     if path.suffix == ".json":
         content = json.loads(path.read_text())
         return content.get("T_target_source", content) if isinstance(content, dict) else content

@@ -12,12 +12,24 @@ from typing import BinaryIO
 from ...errors import CloudFileError
 from ..cloud import Array
 
+UNPACKED = 2**28  # bytes: as many may come of any compressed file
+PACKED_AT_BEST = 100  # bytes from one byte, beyond that: clouds shrink to a third or a tenth, bombs to a thousandth
+
 
 def require_bytes(needed: int, present: int, promise: str) -> None:
     """Raises CloudFileError where a file cannot hold what its header promises: before any allocation."""
     if not 0 <= needed <= present:
         raise CloudFileError(
             f"promises {promise}, at least {needed} bytes, but holds only {max(present, 0)} bytes of data"
+        )
+
+
+def require_unpacked(unpacked: int, packed: int, promise: str) -> None:
+    """Raises CloudFileError where compressed data would take more memory than data of a scan ever does."""
+    if unpacked > max(UNPACKED, PACKED_AT_BEST * packed):
+        raise CloudFileError(
+            f"promises {promise}, {unpacked} bytes of {packed} compressed ones, but more than {PACKED_AT_BEST} times "
+            "as many are what fills a memory, and no scan"
         )
 
 

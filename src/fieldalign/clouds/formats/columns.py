@@ -29,6 +29,7 @@ COLORS = (
 )
 INTENSITY = (("intensity",), ("reflectance",), ("reflectivity",), ("remission",), ("i",))
 TIMES = ("time", "times", "timestamp", "time_stamp", "stamp", "gps_time", "gpstime", "t", "offset_time")
+MOST_COLUMNS = 10_000
 SECONDS = ("time", "times")  # what fieldalign itself writes
 NANOSECONDS = ("t", "offset_time")  # where uint32: Ouster's and Livox's drivers
 
@@ -60,8 +61,10 @@ def cloud_from_table(table: Array) -> PointCloud:
     whole numbers in 0..255, and normals else. Any other column is an attribute, named as in "column_5".
     """
     width = table.shape[1] if table.ndim == 2 else 0
-    if width < 3:
-        raise CloudFileError(f"must hold rows of at least three numbers, but its table has shape {table.shape}")
+    if not 3 <= width <= MOST_COLUMNS:
+        raise CloudFileError(
+            f"must hold rows of at least three numbers (and at most {MOST_COLUMNS}), but has shape {table.shape}"
+        )
     columns = dict(zip("xyz", table[:, :3].T, strict=True))
     if width != 3 and width != 6:
         columns["intensity"] = table[:, 3]

@@ -15,11 +15,13 @@ import numpy as np
 
 from ...errors import CloudFileError, missing_extra
 from ..cloud import Array, PointCloud
-from . import require_bytes
+from . import require_bytes, require_unpacked
 from .columns import cloud_from_columns, columns_of, parts_beyond
 from .viewpoints import pose_from_quaternion, quaternion_of
 
 CHUNK = 1_000_000  # points
+PAGE, CHECKSUM = 1024, 4  # bytes: each page ends in its checksum
+UTF8_MARK = b"\xef\xbb\xbf"
 INTEGER = np.longlong  # not int64: pye57 takes the type code "l" for 32 bits everywhere
 NAMES = {"cartesianX": "x", "cartesianY": "y", "cartesianZ": "z", "timeStamp": "time"}
 NAMES |= {"colorRed": "red", "colorGreen": "green", "colorBlue": "blue"}
@@ -74,6 +76,7 @@ def _opened(path: Path) -> Iterator[tuple[Any, int]]:
     size = path.stat().st_size
     with path.open("rb") as file:
         _check_length(file, size)
+        _check_text(file, size)
     image = pye57.libe57.ImageFile(str(path), "r")
     try:
         yield image, size
@@ -86,6 +89,19 @@ def _check_length(file: BinaryIO, size: int) -> None:
         raise CloudFileError("is not an E57 file: it does not begin with 'ASTM-E57'")
     file.seek(16)
     require_bytes(int.from_bytes(file.read(8), "little"), size, "the length in its header")
+
+
+def _check_text(file: BinaryIO, size: int) -> None:
+    """Raises where the XML of the file declares entities, which its parser would write out until it takes all memory,
+    or read from other files."""
+    start, length = (int.from_bytes(file.read(8), "little") for _ in range(2))
+    require_bytes(start + length, size, "its XML")
+    first = start % PAGE
+    file.seek(start - first)
+    pages = file.read(first + length + CHECKSUM * (length // (PAGE - CHECKSUM) + 2))
+    text = b"".join(pages[at : at + PAGE - CHECKSUM] for at in range(0, len(pages), PAGE))[first:][:length]
+    if b"<!DOCTYPE" in text or text.removeprefix(UTF8_MARK)[:1] != b"<" or b"\0" in text[:8]:
+        raise CloudFileError("is no E57 file: its XML has a document type, or is no text in UTF-8")
 
 
 def _chosen(index: str | None, count: int) -> int:
@@ -122,6 +138,7 @@ def _read_columns(image: Any, points: Any, size: int) -> dict[str, Array]:
     count = points.childCount()
     require_bytes(count // 8, size, f"{count} points")
     fields = _numeric_fields(libe57, points)
+    require_unpacked(8 * count * len(fields), size, f"{count} points")
     piece = {name: np.empty(min(count, CHUNK), dtype) for name, dtype in fields.items()}
     pieces = {name: [values[:0]] for name, values in piece.items()}
     if count:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...errors import CloudFileError, missing_extra
 from ..cloud import Array, PointCloud
-from . import require_bytes
+from . import require_bytes, require_unpacked
 from .columns import cloud_from_columns, columns_of
 
 CHUNK = 1_000_000  # points
@@ -103,6 +103,7 @@ def _check_points(header: Any, file: BinaryIO, size: int) -> None:
     if not header.are_points_compressed:
         require_bytes(header.point_count * header.point_format.size, present, promise)
     elif header.point_count:
+        require_unpacked(header.point_count * header.point_format.size, size, promise)
         held = _laz_capacity(header, file, present)
         if header.point_count > held:
             raise CloudFileError(f"promises {promise}, but its compressed chunks hold at most {held}")

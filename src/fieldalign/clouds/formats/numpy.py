@@ -14,8 +14,8 @@ import numpy as np
 
 from ...errors import CloudFileError
 from ..cloud import Array, PointCloud
-from . import require_bytes
-from .columns import COLORS, NORMALS, cloud_from_columns, cloud_from_table, parts_beyond
+from . import require_bytes, require_unpacked
+from .columns import COLORS, MOST_COLUMNS, NORMALS, cloud_from_columns, cloud_from_table, parts_beyond
 
 DEFLATE_AT_BEST = 1032  # bytes from one byte
 ATTRIBUTES = "attributes/"
@@ -29,14 +29,19 @@ class _ArrayHeader(NamedTuple):
 
 def read_npy(path: Path) -> PointCloud:
     """An (N, 3) array, an (N, k) table as in text files, or a structured array with named columns."""
-    with path.open("rb") as file:
-        dtype = _check_array(file, path.stat().st_size).dtype
-    array = np.load(path, allow_pickle=False)
-    if dtype.names:
-        return cloud_from_columns({name: array[name] for name in dtype.names})
+    array = load_npy(path)
+    if array.dtype.names:
+        return cloud_from_columns({name: array[name] for name in array.dtype.names})
     if array.shape == (4, 4) and np.array_equal(array[3], [0, 0, 0, 1]):
         raise CloudFileError("holds a (4, 4) pose, not a cloud")
     return cloud_from_table(array)
+
+
+def load_npy(path: Path) -> Array:
+    """The array of an .npy that holds what it promises; raises CloudFileError or ValueError where it does not."""
+    with path.open("rb") as file:
+        _check_array(file, path.stat().st_size)
+    return np.asarray(np.load(path, allow_pickle=False))
 
 
 def write_npy(path: Path, cloud: PointCloud) -> list[str]:
@@ -78,10 +83,12 @@ def _cloud_of_arrays(columns: dict[str, Array], key: str, viewpoint: Array | Non
 
 
 def checked_members(path: Path) -> dict[str, _ArrayHeader]:
-    """The headers of all arrays, none of which claims more than its bytes in the file can be."""
+    """The headers of all arrays, none of which claims more than its bytes in the file can be, nor all of them."""
     size = path.stat().st_size
     headers = {}
     with zipfile.ZipFile(path) as archive:
+        unpacked = sum(member.file_size for member in archive.infolist())  # members may share their compressed bytes
+        require_unpacked(unpacked, size, f"{len(archive.infolist())} members")
         for member in archive.infolist():
             best = {zipfile.ZIP_STORED: 1, zipfile.ZIP_DEFLATED: DEFLATE_AT_BEST}[member.compress_type]
             require_bytes(member.file_size, best * min(member.compress_size, size), f"a member {member.filename!r}")
@@ -97,7 +104,10 @@ def _check_array(file: IO[bytes], size: int) -> _ArrayHeader:
     shape, _, dtype = read_header(file)
     if dtype.hasobject:
         raise CloudFileError("holds pickled Python objects, which are never loaded")
-    require_bytes(math.prod(shape) * dtype.itemsize, size - file.tell(), f"an array of shape {shape}")
+    present = size - file.tell()
+    if max(shape, default=0) > max(present, MOST_COLUMNS):  # no bytes at all may hold any number of empty rows
+        raise CloudFileError(f"promises an array of shape {shape}, but holds only {present} bytes of data")
+    require_bytes(math.prod(shape) * dtype.itemsize, present, f"an array of shape {shape}")
     return _ArrayHeader(shape, dtype)
 
 

@@ -11,11 +11,10 @@ import numpy as np
 from ...errors import CloudFileError
 from ..cloud import Array, PointCloud
 from . import require_bytes
-from .columns import COLORS, NORMALS, cloud_from_columns, columns_of
+from .columns import COLORS, MOST_COLUMNS, NORMALS, cloud_from_columns, columns_of
 from .viewpoints import pose_from_quaternion, quaternion_of
 
 LONGEST_HEADER = 100  # lines
-MOST_VALUES = 10_000  # of one point
 LZF_AT_BEST = 88  # bytes from one byte: 264 from 3
 PADDING = "#$%&~~"  # what pypcd4 calls the fields named _
 NOT_SET = [0, 0, 0, 1, 0, 0, 0]  # the VIEWPOINT that every tool writes that knows none
@@ -67,7 +66,7 @@ def _read_header(file: BinaryIO) -> Any:
 def _check_size(header: Any, file: BinaryIO, present: int) -> None:
     """Raises where the data cannot be as long as the header says; leaves the file at its data."""
     values = sum(header.count)
-    if header.width * header.height != header.points or values > MOST_VALUES:
+    if header.width * header.height != header.points or values > MOST_COLUMNS:
         raise CloudFileError(
             f"has a PCD header that cannot be: WIDTH {header.width} x HEIGHT {header.height}, "
             f"POINTS {header.points}, {values} values a point"

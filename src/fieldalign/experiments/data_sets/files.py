@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...clouds.files import read_cloud
+from ...clouds.formats.numpy import checked_members, load_npy
 from ...errors import DataSetError
 from ...motions import Matrix
 
@@ -80,9 +81,18 @@ def number_blocks(file: Path, length: int, kind: str) -> Matrix:
     return values.reshape(-1, length)
 
 
+def array_in(file: Path) -> NDArray[Any]:
+    """The array in an .npy; raises DataSetError where the file is none, or promises more than it holds."""
+    try:
+        return load_npy(file)
+    except (OSError, ValueError) as error:
+        raise DataSetError(f"{file} cannot be read as .npy: {error}") from error
+
+
 def arrays_in(file: Path, *names: str) -> list[NDArray[Any]]:
     """The arrays of these names in an .npz; raises DataSetError where one is missing or the file is none."""
     try:
+        checked_members(file)
         with np.load(file, allow_pickle=False) as arrays:
             return [arrays[name] for name in names]
     except KeyError as error:

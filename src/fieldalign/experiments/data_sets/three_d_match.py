@@ -32,7 +32,7 @@ from ...errors import DataSetError
 from ...motions import Matrix, apply, as_rigid, inverse
 from ...odometry.sequences.folders import natural_order
 from ...threads import resolve_threads
-from .files import PathLike, arrays_in, as_folder, inside, names_in, nothing_of, number_blocks, points_of
+from .files import PathLike, array_in, arrays_in, as_folder, inside, names_in, nothing_of, number_blocks, points_of
 from .gt_log import read_truth
 
 SCENES = (
@@ -134,7 +134,7 @@ def demo_pair(folder: PathLike) -> FragmentPair:
     file, pose = (place / "pointnetlk" / name for name in ("demo_pair.npz", "demo_target_from_source_icp.npy"))
     if not (file.is_file() and pose.is_file()):
         raise nothing_of("PointNetLK-Revisited's demonstration", place, (f"pointnetlk/{file.name} and {pose.name}",))
-    T = as_rigid(np.load(pose, allow_pickle=False), str(pose))
+    T = as_rigid(array_in(pose), str(pose))
     return FragmentPair("demo", "pointnetlk/demo_pair", f"{file}#p1", f"{file}#p0", T)
 
 

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from ...arguments import as_count
 from ...errors import DataSetError
 from ...motions import Matrix, as_rigid, log_motion
-from .files import PathLike, number_blocks
+from .files import PathLike, array_in, number_blocks
 
 
 def from_csv(path: PathLike) -> Matrix:
@@ -75,10 +75,7 @@ def program_pairs(path: PathLike) -> list[ProgramPair]:
 
 def demo_motions(path: PathLike) -> Matrix:
     """The motions P (n, 4, 4) of `paper_pairs/demo_perturb100.npy`: the source is P p1, the answer the inverse of P."""
-    try:
-        motions = np.load(path, allow_pickle=False)
-    except (OSError, ValueError) as error:
-        raise DataSetError(f"{path} cannot be read as motions (n, 4, 4): {error}") from error
+    motions = array_in(Path(path))
     if motions.ndim != 3 or not len(motions):
         raise DataSetError(f"{path} must hold motions (n, 4, 4), but holds an array of shape {motions.shape}")
     return np.array([as_rigid(motion, f"motion {row} of {path}") for row, motion in enumerate(motions)])
