@@ -129,6 +129,15 @@ def test_points_of_the_hdf5_layout(tmp_path, rng):
         modelnet.shapes(tmp_path / "set")
 
 
+def test_an_hdf5_that_would_fill_the_memory(tmp_path, rng):
+    h5py = pytest.importorskip("h5py")
+    in_hdf5(tmp_path / "set", rng)
+    with h5py.File(tmp_path / "set" / "ply_data_test0.h5", "w") as file:
+        file.create_dataset("label", (10**12, 1), "u1", chunks=(10**6, 1), compression="gzip")
+    with pytest.raises(DataSetError, match="an array 'label', 1000000000000 bytes of"):
+        modelnet.shapes(tmp_path / "set")
+
+
 def test_without_h5py_the_extra_is_named(tmp_path, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "h5py", None)
     (tmp_path / "test_files.txt").write_text("a.h5\n")

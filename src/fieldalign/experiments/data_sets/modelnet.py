@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arguments import check_one_of
+from ...clouds.formats import require_unpacked
 from ...errors import DataSetError, missing_extra
 from ...odometry.sequences.folders import natural_order
 from .files import PathLike, arrays_in, as_folder, first_of, inside, names_in, nothing_of, points_of
@@ -127,6 +128,7 @@ def _hdf5(file: Path, name: str, rows: Any) -> NDArray[Any]:
         raise missing_extra("hdf5", f"reading {file.name}") from error
     try:
         with h5py.File(file, "r") as arrays:
+            require_unpacked(arrays[name].nbytes, file.stat().st_size, f"an array {name!r}")
             return np.asarray(arrays[name][rows])
     except (OSError, KeyError, ValueError) as error:
         raise DataSetError(f"{file} cannot be read as an .h5 of ModelNet40 with data and label: {error}") from error
