@@ -194,3 +194,14 @@ def test_without_rosbags_the_extra_is_named(write_bag, monkeypatch):
     monkeypatch.setitem(sys.modules, "rosbags.highlevel", None)
     with pytest.raises(fa.MissingExtraError, match=r"reading a bag needs the extra 'bag'"):
         read_sequence(path)
+
+
+def test_the_text_of_a_bag_runs_nothing_and_names_no_file_elsewhere(write_bag, tmp_path):
+    path = write_bag("sqlite3")
+    text = (path / "metadata.yaml").read_text()
+    (path / "metadata.yaml").write_text(f"{text}\nrun: !!python/object/apply:os.mkdir ['{tmp_path / 'made'}']\n")
+    assert "cannot be opened as a bag" in what_is_left_of(path)
+    assert not (tmp_path / "made").exists()
+    (path / "drive.db3").rename(tmp_path / "drive.db3")
+    (path / "metadata.yaml").write_text(text.replace("drive.db3", "../drive.db3"))
+    assert "cannot be opened as a bag" in what_is_left_of(path)
