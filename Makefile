@@ -5,8 +5,8 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 SOURCES := $(shell find src cpp -name '*.py' -o -name '*.hpp' -o -name '*.cpp' -o -name '*.pyi') CMakeLists.txt pyproject.toml
 
-.PHONY: demo test docs lint bench-paper bench-any-pose bench-verdict bench-fields bench-assemble bench-odometry bench-faults bench-load \
-	experiments wheels clean
+.PHONY: demo test docs lint audit lock mutants dist experiments wheels clean bench-paper bench-any-pose bench-verdict bench-fields \
+	bench-assemble bench-odometry bench-faults bench-load
 
 demo: $(VENV)/.installed-viz      ## simulate two scans of a room, register them, compare with the truth
 	$(BIN)/fieldalign demo --output demo
@@ -19,6 +19,12 @@ test: $(VENV)/.installed-test     ## lint, types, and the whole test suite
 docs: $(VENV)/.installed-docs     ## these pages and the API reference as a site, in build/docs
 	$(BIN)/python -m sphinx -W --keep-going -q -E -d build/docs-cache docs build/docs
 	@echo "open build/docs/index.html"
+
+audit: $(VENV)-audit/bin/pip-audit  ## the locked dependencies: hashes, licences, what was taken back, known weaknesses
+	$(VENV)-audit/bin/python .ci/audit.py
+
+lock: $(VENV)-audit/bin/pip-audit   ## pins every dependency in requirements.lock; remove the file first for the newest ones
+	$(VENV)-audit/bin/python .ci/audit.py --lock
 
 bench-paper: $(VENV)/.installed-viz  ## the figures of the paper's method; needs ../shared/data or $FIELDALIGN_DATA
 	$(BIN)/python benchmarks/paper.py --output docs/benchmarks
@@ -58,12 +64,29 @@ experiments:                      ## the paper's experiments on ../shared/data, 
 	for name in $(EXPERIMENTS); do $(VENV)-bench/bin/fieldalign experiment $$name --peers benchmarks/peers \
 		--data $${FIELDALIGN_DATA:-../shared/data} --output docs/experiments || exit 1; done
 
+dist: $(VENV)-dist/bin/auditwheel  ## the sdist, and a wheel built from it alone; what both hold, and which glibc the wheel needs
+	rm -rf dist
+	$(VENV)-dist/bin/python -m build --outdir dist .
+	$(VENV)-dist/bin/python .ci/contents.py dist
+	$(VENV)-dist/bin/auditwheel show dist/*.whl
+
+mutants: $(VENV)/.installed-test   ## mutation testing of the solver, the verdict and the readers; hours
+	$(BIN)/python benchmarks/mutants.py --output docs/benchmarks
+
 wheels: $(VENV)/bin/python        ## wheels for this platform, as CI builds them
 	$(BIN)/pip install --quiet cibuildwheel
 	$(BIN)/cibuildwheel --output-dir dist
 
 clean:
-	rm -rf $(VENV) $(VENV)-bench build dist demo .mypy_cache .ruff_cache .pytest_cache
+	rm -rf $(VENV) $(VENV)-bench $(VENV)-audit $(VENV)-dist build dist demo .mypy_cache .ruff_cache .pytest_cache
+
+$(VENV)-audit/bin/pip-audit:
+	$(PYTHON) -m venv $(VENV)-audit
+	$(VENV)-audit/bin/pip install --quiet --upgrade pip pip-audit uv
+
+$(VENV)-dist/bin/auditwheel:
+	$(PYTHON) -m venv $(VENV)-dist
+	$(VENV)-dist/bin/pip install --quiet --upgrade pip build auditwheel
 
 $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)

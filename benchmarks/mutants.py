@@ -40,12 +40,11 @@ AREAS = {
     "solver": Area(
         ("alignment/*.py", "methods/by_points.py", "methods/pair.py", "methods/paper.py", "methods/refined.py",
          "methods/robust.py", "methods/similar.py", "motions.py"),
-        ("alignment", "test_motions.py", "laws/test_copies.py", "methods"),
+        ("alignment", "test_motions.py", "methods/test_exact.py", "methods/test_paper.py"),
     ),
     "verdict": Area(
         ("verdict/*.py", "methods/judged.py", "methods/paper_verdict.py"),
-        ("verdict", "methods/test_judged.py", "methods/test_paper_verdict.py", "test_verify.py",
-         "methods/test_robust.py"),
+        ("verdict", "methods/test_judged.py", "methods/test_paper_verdict.py", "test_verify.py"),
     ),
     "readers": Area(
         ("clouds/files.py", "clouds/checks.py", "clouds/formats/*.py", "fields/files.py", "fields/volume_files.py"),
