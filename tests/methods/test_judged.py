@@ -1,15 +1,17 @@
 """From refined poses to results: what is compared with what, what a sensor contradicts, and what nothing holds."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import fieldalign as fa
 from fieldalign.clouds.simulated import simulate_pair
+from fieldalign.methods import judged as judging
 from fieldalign.methods.judged import CLEARLY_OTHER, Contest
 from fieldalign.methods.pair import Pair
-from fieldalign.motions import apply, exp_twist, inverse, log_motion, translation
+from fieldalign.motions import angles_between, apply, exp_twist, inverse, log_motion, translation
 from fieldalign.verdict.evidence import MAX_SEEN_THROUGH, MIN_HOLD
 
 
@@ -36,6 +38,50 @@ def test_the_margin_is_over_the_best_pose_that_is_clearly_another(scans):
     alone = Contest(poses[:2], scores[:2], True).margin(np.eye(4), 0.6, pair)
     assert np.isfinite(alone)
     assert alone > 1e6
+
+
+def test_at_the_scale_of_the_noise_the_misfit_is_a_share_of_what_nearly_all_keep_to():
+    """Three deviations, or the distance that 95 of 100 places keep to; what lies further, or nowhere, counts as one."""
+    nothing = Contest(np.empty((0, 4, 4)), np.empty(0), True)
+    pair = SimpleNamespace(middle=np.zeros(3), voxel=1.0)
+
+    def against_chance(distances, scale):
+        last = SimpleNamespace(distances=lambda G: np.array(distances), scale=scale)
+        return nothing.at_the_noise(SimpleNamespace(last=last, G=np.eye(4)), pair)
+
+    assert against_chance([0.1] * 10, scale=0.4) == pytest.approx(4)  # a half of three deviations: 0.2
+    assert against_chance([0.1, 0.2, 0.9, np.inf], scale=0.4) == pytest.approx(4 / np.sum((np.array(
+        [0.1, 0.2, np.quantile([0.1, 0.2, 0.9], 0.95), 9]) / np.quantile([0.1, 0.2, 0.9], 0.95)).clip(max=1) ** 2))
+    assert against_chance([np.inf, np.inf], scale=0.4) == 0
+
+
+def test_of_equally_good_poses_the_one_that_turns_least_from_the_guess_comes_first(any_motion, rng, monkeypatch):
+    """A box of three sizes lies on itself in four ways, here point on point; searched for in all poses."""
+    half_a_turn = [np.zeros(3), *(np.pi * np.eye(3))]
+    quarter, T = sides((1, 2, 3), 2000, rng), any_motion(rng, 3.0)
+    box = np.vstack([apply(exp_twist(np.r_[turn, 0, 0, 0]), quarter) for turn in half_a_turn])
+    ways = [T @ exp_twist(np.r_[turn, 0, 0, 0]) for turn in half_a_turn]
+    clouds = fa.prepare(box), fa.prepare(apply(T, box))
+
+    def first_from(way):
+        guess = exp_twist(np.r_[0.2, -0.3, 0.2, 0.1, 0, 0]) @ way
+        result = fa.register(*clouds, init=guess, search=True)
+        assert len(result.alternatives) >= 1
+        return int(np.argmin(angles_between(result.T_target_source, np.stack(ways))))
+
+    monkeypatch.setattr(judging, "_EQUAL", judging.RIVAL)  # which surfels there are makes scores differ
+    assert [first_from(way) for way in ways[:3]] == [0, 1, 2]
+    monkeypatch.setattr(judging, "_EQUAL", 1.0)
+    assert len({first_from(way) for way in ways[:2]}) == 1
+
+
+def test_points_that_meet_tell_a_box_from_itself_turned(any_motion, rng):
+    """Its surface lies on itself in four ways, its points in one."""
+    T, box = any_motion(rng, 3.0), sides((1, 2, 3), 8000, rng)
+    result = fa.register(box, apply(T, box))
+    assert result.accepted
+    assert result.alternatives == ()
+    assert angles_between(result.T_target_source, T) < 1e-8
 
 
 @pytest.mark.parametrize("search", [True, False])
@@ -67,6 +113,16 @@ def test_the_papers_method_has_no_evidence(scans):
 
 
 # -------------------------------------------------------------------------------------------- what was looked through
+
+
+def sides(edges, n, rng):
+    """The surface of a box about the origin."""
+    places = rng.uniform(-1, 1, (n, 3))
+    sizes = np.array(edges) / 2
+    areas = np.prod(sizes) / sizes
+    rows = rng.choice(3, n, p=areas / areas.sum())
+    places[np.arange(n), rows] = np.sign(places[np.arange(n), rows])
+    return places * sizes
 
 
 def with_a_screen(scans, behind):
