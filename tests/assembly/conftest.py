@@ -24,6 +24,7 @@ def cluster(jobs):
     """The address of a scheduler of this machine with two workers."""
     distributed = pytest.importorskip("distributed", reason="the extra dask is not installed")
     with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, dashboard_address="127.0.0.1:0", silence_logs=logging.CRITICAL
+        n_workers=2, threads_per_worker=1, dashboard_address="127.0.0.1:0", worker_dashboard_address="127.0.0.1:0",
+        silence_logs=logging.CRITICAL,
     ) as local:
         yield local.scheduler_address

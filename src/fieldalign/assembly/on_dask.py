@@ -66,7 +66,8 @@ class Dask:
             # A death is judged here (work.Line), where a suspect goes again alone.
             # Whoever reaches a scheduler may run code on its workers: nothing of it listens to other machines.
             LocalCluster(n_workers=self.workers, threads_per_worker=1, host=_HERE, dashboard_address=f"{_HERE}:0",
-                         silence_logs=logging.CRITICAL, scheduler_kwargs={"allowed_failures": 0}) as cluster,
+                         worker_dashboard_address=f"{_HERE}:0", silence_logs=logging.CRITICAL,
+                         scheduler_kwargs={"allowed_failures": 0}) as cluster,
             Client(cluster, set_as_default=False) as client,
         ):
             yield client
