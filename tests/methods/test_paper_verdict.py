@@ -9,8 +9,9 @@ from scipy.spatial.transform import RigidTransform
 
 import fieldalign as fa
 from fieldalign.alignment import Alignment, Step
+from fieldalign.dof import Dof
 from fieldalign.fields import FieldSample, sampled
-from fieldalign.methods.paper_verdict import MIN_OVERLAP, STILL, certainty, judge, overlaps, rmse
+from fieldalign.methods.paper_verdict import COARSE, MIN_OVERLAP, STILL, certainty, judge, overlaps, rmse
 from fieldalign.motions import apply, exp_twist, inverse, translation
 from fieldalign.prepare import prepare
 
@@ -160,6 +161,10 @@ def distances(values):
     return FieldSample(np.array(values, float), none, none, none)
 
 
+def test_the_thresholds_are_those_that_are_told():
+    assert (STILL, COARSE, MIN_OVERLAP) == (1e-3, 0.05, 0.2)
+
+
 def test_rmse_is_of_the_kept_distances_and_takes_no_side():
     source, target = distances([1, -2, 3, 100]), distances([2, 2, -1, 0])
     kept = np.array([True, True, True, False])
@@ -234,6 +239,30 @@ def test_residuals_of_zero_are_no_certainty_without_end(pose, pseudo):
     assert np.isfinite(what.information).all()
     assert np.isfinite(what.covariance).all()
     assert 0 < np.trace(what.covariance) < 1e-12
+
+
+@pytest.mark.parametrize("weight", [1.0, 7.0])
+def test_residuals_of_zero_are_taken_for_the_resolution_of_the_largest_squared_distance(pose, pseudo, rng, weight):
+    r, weights = rng.normal(0, 0.01, 400), np.full(400, weight)
+    curvature = known(THREE, pose, pseudo, r, weights).information * weight * (r**2).sum() / (400 - 6)
+    largest = THREE.sample(apply(inverse(pose), pseudo))[0].max() ** 2
+    exact = known(THREE, pose, pseudo, np.zeros(400), weights).information
+    assert np.allclose(exact, curvature / (weight * (1e-12 * largest) ** 2), rtol=1e-9)
+
+
+def test_what_a_dof_locks_is_neither_known_nor_open(pose, pseudo, rng):
+    """Free is a turn about a line, counted from a guess: seen from the reference, it is a turn and a shift."""
+    centre, axis = np.array([1.0, 2, 3]), np.array([0.0, 0, 1])
+    guess = translation(centre) @ exp_twist(np.r_[0.3 * axis, 0, 0, 0]) @ translation(-centre) @ pose
+    found = alignment(T=pose, n=400)
+    r = rng.normal(0, 0.01, 400)
+    what = certainty(sampled(THREE, apply(inverse(pose), pseudo)), pseudo, found, r, Dof("yaw", centre=centre), guess)
+    assert what.unobservable.shape == (6, 0)
+    assert what.observable.shape == (6, 1)
+    expected = np.r_[axis, np.cross(axis, what.reference_point - centre)]
+    assert np.allclose(what.observable[:, 0] / what.observable[2, 0], expected, atol=1e-9)
+    all_free = certainty(sampled(THREE, apply(inverse(pose), pseudo)), pseudo, found, r, None, None)
+    assert what.covariance[2, 2] == pytest.approx(1 / (expected @ all_free.information @ expected))
 
 
 def is_generalised_inverse(C, information):

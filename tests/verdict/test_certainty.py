@@ -100,6 +100,7 @@ def assert_all_open(found):
     assert not found.information.any()
     assert not found.covariance.any()
     assert not found.hold.any()
+    assert found.length == 1  # the unit's own: there is none to compare with
     assert len(freedoms(found)) == 6
 
 
