@@ -40,7 +40,7 @@ AREAS = {
     "solver": Area(
         ("alignment/*.py", "methods/by_points.py", "methods/pair.py", "methods/paper.py", "methods/refined.py",
          "methods/robust.py", "methods/similar.py", "motions.py"),
-        ("alignment", "test_motions.py", "methods/test_exact.py", "methods/test_paper.py"),
+        ("alignment", "test_motions.py", "methods/test_exact.py"),
     ),
     "verdict": Area(
         ("verdict/*.py", "methods/judged.py", "methods/paper_verdict.py"),
@@ -48,7 +48,8 @@ AREAS = {
     ),
     "readers": Area(
         ("clouds/files.py", "clouds/checks.py", "clouds/formats/*.py", "fields/files.py", "fields/volume_files.py"),
-        ("clouds", "fields/test_files.py", "fields/test_volume_files.py"),
+        ("clouds/test_files.py", "clouds/test_foreign_writers.py", "clouds/test_bad_files.py", "fields/test_files.py",
+         "fields/test_volume_files.py", "clouds/test_checks.py", "clouds/test_bombs.py", "clouds/test_byte_order.py"),
     ),
 }
 MOST = 150  # seconds of a processor, for all tests of an area: what needs more hangs

@@ -3,10 +3,14 @@
 import ast
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
+
+import pytest
 
 import fieldalign as fa
 
+ROOT = Path(__file__).parents[1]
 SOURCE = Path(fa.__file__).parent
 MODULES = sorted(SOURCE.rglob("*.py"))
 PEERS = {"open3d", "small_gicp", "kiss_matcher", "kiss_icp", "teaserpp_python", "evo"}
@@ -50,3 +54,22 @@ def test_every_exception_is_ours():
         assert issubclass(error, fa.FieldalignError)
     assert issubclass(fa.ArgumentError, ValueError)
     assert issubclass(fa.CloudFileError, ValueError)
+
+
+def test_the_lock_holds_what_the_package_asks_for():
+    """Every dependency, and those of the extras that are locked, by hash, at a version that is allowed."""
+    Requirement = pytest.importorskip("packaging.requirements").Requirement
+    canonicalize_name = pytest.importorskip("packaging.utils").canonicalize_name
+    blocks = (ROOT / "requirements.lock").read_text().replace("\\\n", " ").splitlines()
+    pins: dict[str, list[str]] = {}
+    for block in blocks:
+        pin, *hashes = block.split(" --hash=sha256:")
+        name, _, version = pin.partition(";")[0].strip().partition("==")
+        assert hashes, f"{name} is locked without a hash"
+        pins.setdefault(canonicalize_name(name), []).append(version)
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    extras = project["optional-dependencies"]
+    locked = [extras[name] for name in ("viz", "las", "e57", "mesh", "volume", "dask", "bag", "hdf5")]
+    for requirement in map(Requirement, sum(locked, project["dependencies"])):
+        versions = pins[canonicalize_name(requirement.name)]
+        assert all(version in requirement.specifier for version in versions), f"{requirement}: run `make lock`"

@@ -43,3 +43,8 @@ class MissingExtraError(FieldalignError, ImportError):
 def missing_extra(extra: str, purpose: str) -> MissingExtraError:
     """The error for an absent optional dependency: what it is needed for, and the command that brings it."""
     return MissingExtraError(f"{purpose} needs the extra '{extra}': pip install 'fieldalign[{extra}]'")
+
+
+def printable(text: str) -> str:
+    """The text with a sign in the place of each that a terminal would obey: files may say anything."""
+    return "".join(sign if sign.isprintable() else "\N{REPLACEMENT CHARACTER}" for sign in text)

@@ -423,3 +423,18 @@ def test_a_kitti_file_of_another_row_length(tmp_path):
 def test_a_device_is_no_file(path):
     with pytest.raises(CloudFileError, match="is not a regular file"):
         read_cloud(path)
+
+
+@pytest.mark.parametrize("read", [read_cloud, lambda path: list(read_clouds(path))], ids=["one", "all"])
+def test_what_a_file_says_of_itself_does_nothing_to_a_terminal(read, tmp_path):
+    """Escape sequences may rewrite what stands there, or set the title of its window."""
+    evil = b"\x1b]0;hacked\x07\x1b[2J\x9b"
+    head = b"ply\nformat ascii 1.0\nelement vertex 0\nproperty int " + evil + b"\nend_header\n"
+    (tmp_path / "a.ply").write_bytes(head)
+    np.savez(tmp_path / "b.npz", **{evil.decode("latin1"): np.zeros(3)})
+    (tmp_path / "c.txt").write_bytes(evil + b" y z\n1 2 3\n")
+    for name in ("a.ply", "b.npz", "c.txt"):
+        with pytest.raises(CloudFileError) as caught:
+            read(tmp_path / name)
+        assert str(caught.value).isprintable()
+        assert "hacked" in str(caught.value)

@@ -18,7 +18,7 @@ from typing import NoReturn
 
 import click
 
-from ..errors import FieldalignError
+from ..errors import FieldalignError, printable
 from . import loudness
 
 VERBS = (
@@ -130,9 +130,9 @@ class _Warnings(logging.Handler):
 def _warn(message: str) -> None:
     """A line, in place of a bar that stands there."""
     if not loudness.is_quiet():
-        click.echo(("\r\x1b[K" if sys.stderr.isatty() else "") + f"Warning: {message}", err=True)
+        click.echo(("\r\x1b[K" if sys.stderr.isatty() else "") + printable(f"Warning: {message}"), err=True)
 
 
 def _fail(message: str) -> NoReturn:
-    click.echo("Error: " + " ".join(message.split()), err=True)
+    click.echo("Error: " + printable(" ".join(message.split())), err=True)
     sys.exit(1)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import CloudFileError, MissingExtraError
+from ..errors import CloudFileError, MissingExtraError, printable
 from ..whole_file import replacing
 from .cloud import PointCloud
 from .formats import e57, kitti, las, mesh, numpy, pcd, ply, text
@@ -139,14 +139,15 @@ def _named_scans(file: Path, read_all: Callable[[Path], Iterator[PointCloud]]) -
 
 @contextmanager
 def errors_naming(file: Path, verb: str) -> Iterator[None]:
-    """Gives a CloudFileError the name of its file, and makes one of whatever else is raised."""
+    """Gives a CloudFileError the name of its file, and makes one of whatever else is raised; what the file itself says
+    in it does nothing to a terminal."""
     try:
         yield
     except MissingExtraError:
         raise
     except CloudFileError as error:
-        raise CloudFileError(f"{file} {error}") from error
+        raise CloudFileError(f"{file} {printable(str(error))}") from error
     except Exception as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         first_line = (reason.strip() or type(error).__name__).splitlines()[0]
-        raise CloudFileError(f"{file} cannot be {verb} as {file.suffix}: {first_line}") from error
+        raise CloudFileError(f"{file} cannot be {verb} as {file.suffix}: {printable(first_line)}") from error

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...clouds.cloud import PointCloud
-from ...errors import CloudFileError, FieldalignError, MissingExtraError
+from ...errors import CloudFileError, FieldalignError, MissingExtraError, printable
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,7 @@ def frame_of(index: int, stamp: float | None, read: Callable[[], PointCloud]) ->
 
 def reason_of(error: Exception) -> str:
     """What went wrong, in one line."""
-    first_line = (str(error).strip() or type(error).__name__).splitlines()[0]
+    first_line = printable((str(error).strip() or type(error).__name__).splitlines()[0])
     return first_line if isinstance(error, FieldalignError) else f"{type(error).__name__}: {first_line}"
 
 
