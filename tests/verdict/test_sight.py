@@ -45,6 +45,30 @@ def test_a_place_that_is_short_by_less_than_some_voxels_lies_on_the_wall(wall, r
     assert not sight.looked_through(places, 1.0).any()
 
 
+@pytest.fixture
+def shell(rng):
+    """Directions all around (n, 3): of what is ten units away from a sensor at the origin."""
+    directions = rng.normal(size=(20_000, 3))
+    return directions / np.linalg.norm(directions, axis=1)[:, None]
+
+
+@pytest.mark.parametrize("scale", [1.0, 100.0])
+def test_a_place_that_is_short_by_less_than_a_twentieth_of_the_range_lies_on_what_is_behind_it(shell, scale):
+    """However fine the voxel is: a cell of directions is a degree or two wide."""
+    sight = Sight(10 * scale * shell, np.zeros(3))
+    for share, through in ((0.96, False), (0.94, True)):
+        assert (sight.looked_through(10 * scale * share * shell[:500], 1e-3 * scale) == through).all()
+
+
+def test_a_sensor_looks_past_what_it_would_see_edge_on(shell):
+    sight, rays = Sight(10 * shell, np.zeros(3)), shell[:500]
+    across = np.cross(rays, [0.3, 0.5, 0.8])
+    across /= np.linalg.norm(across, axis=1)[:, None]
+    for cosine, through in ((0.0, False), (0.19, False), (0.21, True), (-0.21, True), (1.0, True)):
+        normals = cosine * rays + np.sqrt(1 - cosine**2) * across
+        assert (sight.looked_through(5 * rays, VOXEL, normals) == through).all()
+
+
 def test_only_the_place_of_the_sensor_matters(wall, rng):
     eye = np.array([100.0, -20, 7])
     for share in (0.5, 1.1):
