@@ -27,8 +27,9 @@ def read(path: Path) -> PointCloud:
     with path.open("rb") as file:
         header = _read_header(file)
         _check_size(header, file, path.stat().st_size - file.tell())
-        # pypcd4 takes exactly one blank between the values of an ascii row.
-        rows = _read_ascii(file, header) if header.data == "ascii" else pypcd4.PointCloud.from_path(path).pc_data
+        # pypcd4 takes exactly one blank between the values of an ascii row, and no points for one without columns.
+        is_own = header.data == "ascii" or not header.points
+        rows = _read_ascii(file, header) if is_own else pypcd4.PointCloud.from_path(path).pc_data
     if len(rows) != header.points:
         raise CloudFileError(f"promises {header.points} points, but holds {len(rows)}")
     columns = {name: rows[name] for name in rows.dtype.names or () if not name.startswith(PADDING)}
