@@ -8,14 +8,15 @@ import pytest
 from scipy.spatial import cKDTree
 
 import fieldalign as fa
+from fieldalign import _core
 from fieldalign.alignment import descend
 from fieldalign.alignment.agreement import both_ways, mutual_score
-from fieldalign.alignment.robust import LEVELS, FieldStage, GridStage, anneal
+from fieldalign.alignment.robust import _FEW, LEVELS, FieldStage, GridStage, _spread, anneal
 from fieldalign.clouds.simulated import simulate_pair
 from fieldalign.dof import Allowed
 from fieldalign.evaluation import rotation_error, translation_error
 from fieldalign.fields import PointField
-from fieldalign.fields.protocol import planes_near
+from fieldalign.fields.protocol import Planes, planes_near
 from fieldalign.motions import apply, exp_twist, inverse, rotate, translation
 from fieldalign.surface import Surface
 
@@ -220,8 +221,62 @@ def test_what_may_not_grow_does_not():
     stage = box_stage(np.eye(4), 1.03)
     _, steps = descend(stage, np.eye(4)[None])
     assert stage.growth == 1
+    assert stage.increment[6] == 0
     assert all(step.increment.shape == (6,) for step in steps)
     assert stage.rmse > 1e-3
+
+
+# ------------------------------------------------------------------------------------------------- what is told of it
+
+
+def planes(thickness, width):
+    nowhere = np.zeros((len(thickness), 3))
+    return Planes(nowhere, nowhere, np.array(thickness, float), np.array(width, float))
+
+
+def test_the_spread_counts_both_thicknesses_and_the_sparser_side_more():
+    own, other = planes([1, 2, 1, 1], [1, 0.5, 10, 0]), planes([3, 1, 2, 2], [2, 0.5, 1, 5])
+    variance = np.array([1 + 4 * 9, 4 + 1, 1 + 0.1 * 4, 1 + 4])  # widths in the ratios 2, 1, 0.1 and none
+    typical = np.median(variance)
+    found = _spread(own, other)
+    assert np.allclose(found**2 - variance / typical, (found**2 - variance / typical)[0])  # a floor, the same for all
+    assert 0 < (found**2 - variance / typical)[0] < 0.5
+    assert np.array_equal(_spread(planes([0, 0], [1, 1]), planes([0, 0], [1, np.inf])), [1, 1])
+
+
+def test_roughness_is_of_both_clouds():
+    stage = box_stage(np.eye(4))
+    stage.taken, stage.partners = planes([0.1, 0.2, 9], [1, 2, 1]), planes([0.3, 0.6, 0], [1, 2, 0])
+    assert stage.roughness == pytest.approx(np.sqrt((0.1**2 + 0.3**2) / 2))
+
+
+def test_scatter_is_that_of_runs_or_where_they_are_few_of_each_point_alone():
+    stage = box_stage(np.eye(4), 1.03)
+    descend(stage, np.eye(4)[None])
+    shrunk = _core.stretch(stage.totals[None])
+    alone = (stage.rmse**2 + (1e-12 * stage.extent) ** 2) / shrunk**2 * stage.H
+    kept = stage.totals[3]
+    stage.scatter = 2 * alone
+    share = (stage.gradient_scatter / alone)[0, 0] - 1  # of the runs' in the mixture
+    assert 0.5 < share < 1
+    assert np.allclose(stage.gradient_scatter, (1 + share) * alone)
+    stage.totals = np.r_[stage.totals[:3], 0.0]
+    assert np.allclose(stage.gradient_scatter, alone)  # no run at all
+    assert share / (1 - share) == pytest.approx(kept / _core.RUN / _FEW)
+
+
+def test_distances_are_to_planes_and_infinite_where_none_agrees():
+    """Places that lie a tenth above the top of the box; further than the reach; and such as face aside."""
+    stage = box_stage(np.eye(4))
+    x = np.random.default_rng(5).uniform(-0.3, 0.3, (30, 2))
+    up = np.tile([0.0, 0, 1], (30, 1))
+    top = np.c_[x, np.full(30, 0.4)]
+    stage.taken = Planes(top + 0.1 * up, up, np.full(30, 0.01), np.full(30, 0.1))
+    assert np.allclose(stage.distances(np.eye(4)), 0.1, atol=1e-12)
+    assert np.allclose(stage.distances(translation([0, 0, -0.05])), 0.05, atol=1e-12)
+    assert np.isinf(stage.distances(translation([0, 0, 0.25]))).all()  # 0.35 away, with a reach of 0.3
+    stage.taken = Planes(top, np.roll(up, 1, axis=1), np.full(30, 0.01), np.full(30, 0.1))
+    assert np.isinf(stage.distances(np.eye(4))).all()
 
 
 @pytest.mark.parametrize("free", ["levelled", "rx ry", "rz x", "yaw", "translation"])
