@@ -17,7 +17,7 @@ PICKLING = {"assembly/identity.py", "assembly/work.py", "assembly/on_dask.py", "
 UNPICKLING = {  # what worker processes of this run sent, or what it wrote for them into a folder that is only its own
     "assembly/on_dask.py": ["pickle.loads"], "assembly/processes.py": ["pickle.load", "pickle.loads"],
 }
-LATE = {"__init__.py", "cli/__init__.py", "experiments/__init__.py", "experiments/scenes/streams.py"}  # one package each
+LATE = {"__init__.py", "cli/__init__.py", "experiments/__init__.py", "experiments/scenes/streams.py"}  # of one package
 FOREIGN_CODE = {"experiments/columns.py": ["spec.loader.exec_module"]}  # adapters in a folder that the user names
 PROCESSES = {"cli/demo.py": ["subprocess.run"]}  # this very program
 

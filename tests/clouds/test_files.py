@@ -179,6 +179,18 @@ def test_las_chooses_its_scale_from_the_data(suffix, extent, shift, tmp_path):
     assert error <= max(1e-6 * extent, 4e-9 * (shift > 0))
 
 
+@pytest.mark.parametrize(("largest", "is_own"), [(65535, True), (65536, False), (-1, False)])
+def test_las_has_a_place_of_its_own_for_whole_intensities_that_fit(largest, is_own, tmp_path):
+    """16 bits; what does not fit goes into a column that CloudCompare knows."""
+    laspy = pytest.importorskip("laspy")
+    intensity = np.array([0, 1, 300, largest], float)
+    back = round_trip(PointCloud(RNG.random((4, 3)), intensity=intensity), tmp_path / "scan.las")
+    assert np.array_equal(back.intensity, intensity)
+    written = laspy.read(tmp_path / "scan.las")
+    assert np.array_equal(written.intensity, intensity) is is_own
+    assert ("scalar_Intensity" in written.point_format.dimension_names) is not is_own
+
+
 def test_las_keeps_intensity_that_is_no_whole_number(tmp_path):
     needs_library(".las")
     intensity = RNG.random(N)

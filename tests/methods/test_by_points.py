@@ -8,6 +8,7 @@ from fieldalign.evaluation import rotation_error, translation_error
 from fieldalign.methods.by_points import Points, _turns
 from fieldalign.methods.pair import Pair
 from fieldalign.motions import angles_between, apply, growth
+from fieldalign.settings import PRESETS
 
 PRIOR = {"init": np.eye(4), "search_angle": 50}
 
@@ -114,3 +115,14 @@ def test_misfit_is_nothing_where_points_meet_and_grows_from_there(T):
     far = T.copy()
     far[:3, 3] += 0.1
     assert 0 < points.misfit(near) < points.misfit(far)
+
+
+def test_the_settings_have_the_size_of_the_target_wherever_it_lies(T):
+    """What the paper says of objects of unit size, times the longest edge of the target's box."""
+    target = shape(500) * [1.0, 2.0, 0.5]
+    for offset in ([0, 0, 0], [100.0, -20, 7]):
+        found = Points(fa.prepare(shape(500)), fa.prepare(target + offset), 1)._settings(77)
+        edge = np.ptp(target, axis=0).max()
+        assert found.half_width == pytest.approx(PRESETS["object"].half_width * edge)
+        assert found.unit == pytest.approx(edge)
+        assert found.pseudo_count == 77
