@@ -10,6 +10,7 @@ import pytest
 
 from fieldalign.clouds.cloud import PointCloud
 from fieldalign.clouds.files import FORMATS, read_cloud, read_clouds, write_cloud
+from fieldalign.clouds.formats import kitti
 from fieldalign.errors import ArgumentError, CloudFileError, MissingExtraError
 
 RNG = np.random.default_rng(7)
@@ -177,6 +178,21 @@ def test_las_chooses_its_scale_from_the_data(suffix, extent, shift, tmp_path):
     points = shift + RNG.random((N, 3)) * extent
     error = np.abs(round_trip(PointCloud(points), tmp_path / f"scan{suffix}").points - points).max()
     assert error <= max(1e-6 * extent, 4e-9 * (shift > 0))
+
+
+@pytest.mark.parametrize(
+    ("largest", "kind"), [(63, b"int"), (2**31 - 1, b"int"), (2**31, b"double"), (-(2**31) - 1, b"double")]
+)
+def test_a_ply_holds_whole_numbers_of_64_bits_as_32_where_they_fit(largest, kind, tmp_path):
+    cloud = PointCloud(np.zeros((2, 3)), attributes={"ring": np.array([0, largest])})
+    assert round_trip(cloud, tmp_path / "a.ply").attributes["ring"].tolist() == [0, largest]
+    assert b"property " + kind + b" ring\n" in (tmp_path / "a.ply").read_bytes()
+
+
+def test_a_missing_return_is_no_digit_that_kitti_loses(tmp_path):
+    points = np.array([[1.0, 2, 3], [np.nan] * 3, [0.1, 0.2, 0.3]])
+    assert kitti.write(tmp_path / "a.bin", PointCloud(points.astype(np.float32))) == []
+    assert kitti.write(tmp_path / "a.bin", PointCloud(points)) == ["the digits of the points beyond float32"]
 
 
 @pytest.mark.parametrize(("largest", "is_own"), [(65535, True), (65536, False), (-1, False)])
