@@ -40,7 +40,7 @@ AREAS = {
     "solver": Area(
         ("alignment/*.py", "methods/by_points.py", "methods/pair.py", "methods/paper.py", "methods/refined.py",
          "methods/robust.py", "methods/similar.py", "motions.py"),
-        ("alignment", "test_motions.py", "methods/test_exact.py"),
+        ("alignment", "test_motions.py", "methods/test_exact.py", "methods/test_similar.py", "methods/test_dof.py"),
     ),
     "verdict": Area(
         ("verdict/*.py", "methods/judged.py", "methods/paper_verdict.py"),

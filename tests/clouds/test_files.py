@@ -181,7 +181,8 @@ def test_las_chooses_its_scale_from_the_data(suffix, extent, shift, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("largest", "kind"), [(63, b"int"), (2**31 - 1, b"int"), (2**31, b"double"), (-(2**31) - 1, b"double")]
+    ("largest", "kind"),
+    [(63, b"int"), (2**31 - 1, b"int"), (-(2**31), b"int"), (2**31, b"double"), (-(2**31) - 1, b"double")],
 )
 def test_a_ply_holds_whole_numbers_of_64_bits_as_32_where_they_fit(largest, kind, tmp_path):
     cloud = PointCloud(np.zeros((2, 3)), attributes={"ring": np.array([0, largest])})
