@@ -130,6 +130,7 @@ Array<std::uint32_t> keypoints(const PointTree& tree, double salient_radius, dou
 
 template <class Real>
 nb::tuple thin_points(Points<Real> points, Points<double> bounds, double voxel, int threads) {
+  check_lengths(2, {bounds.shape(0)});
   Thinned thinned;
   {
     nb::gil_scoped_release free;

@@ -37,7 +37,7 @@ bool sort_along_curve(PointsView<Real> points, std::span<Placed> items, const Bo
   const Vec3 extent = bounds.hi - bounds.lo;
   const double longest = std::max({extent.x, extent.y, extent.z});
   const double scale = 1023.999 / longest;
-  if (!(longest > 0) || !std::isfinite(scale)) return false;
+  if (!(longest > 0) || !std::isfinite(longest) || !std::isfinite(scale)) return false;
   parallel_blocks(items.size(), kPointBlock, threads, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const Vec3 cell = scale * (points[items[i].index] - bounds.lo);

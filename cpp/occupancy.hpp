@@ -1,6 +1,7 @@
 // How many cells of a lattice points fill, for one cell size after the other: what a cloud's own scale is read from.
 #pragma once
 
+#include "casts.hpp"
 #include "curve.hpp"
 
 namespace fieldalign {
@@ -35,8 +36,8 @@ inline Bounds core_of(const std::vector<Vec3>& points) {
 
 // Morton's code of a cell, 20 bits an axis: equal leading bits are equal cells.
 inline std::uint64_t code_of(Vec3 cell) {
-  const auto x = static_cast<std::uint32_t>(cell.x), y = static_cast<std::uint32_t>(cell.y),
-             z = static_cast<std::uint32_t>(cell.z);
+  const auto whole = [](double v) { return cast_within<std::uint32_t>(v, 0, (1 << kHalvings) - 1); };
+  const std::uint32_t x = whole(cell.x), y = whole(cell.y), z = whole(cell.z);
   const auto half = [&](int shift) -> std::uint64_t {
     return kSpread[x >> shift & 1023] | kSpread[y >> shift & 1023] << 1 | kSpread[z >> shift & 1023] << 2;
   };
@@ -50,6 +51,8 @@ Occupancy occupancy(PointsView<Real> points, std::size_t most, int threads) {
   for (std::size_t i = 0; i < sample.size(); ++i)
     sample[i] = points[static_cast<std::size_t>(static_cast<double>(i) * points.n / sample.size())];
   Occupancy result;
+  std::erase_if(sample, [](Vec3 p) { return !is_finite(p); });
+  if (sample.empty()) throw std::invalid_argument("an occupancy needs points that are finite");
   result.core = core_of(sample);
   std::erase_if(sample, [&](Vec3 p) { return !contains(result.core, p); });
   Bounds bounds;

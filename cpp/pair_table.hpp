@@ -73,7 +73,7 @@ class PairTable {
  private:
   std::size_t bin_of(const PairFeature& f) const {
     const auto bin = [](float share, int count) {
-      return static_cast<std::size_t>(std::clamp(static_cast<int>(share * static_cast<float>(count)), 0, count - 1));
+      return static_cast<std::size_t>(cast_within(share * static_cast<float>(count), 0, count - 1));
     };
     const std::size_t d = bin((f.distance - band_.shortest) / (band_.longest - band_.shortest), kDistances);
     const std::size_t steep = bin(f.first, kSteep) * kSteep + bin(f.second, kSteep);

@@ -19,8 +19,8 @@ namespace fieldalign {
 // waits for blocks that were begun, not for threads: one that a busy machine starts late finds nothing left, and ends.
 template <class Body>
 void parallel_blocks(std::size_t n, std::size_t block, int threads, Body body) {
+  if (n == 0) return;  // and `block` may be 0, too
   const std::size_t blocks = (n + block - 1) / block;
-  if (blocks == 0) return;
   struct Progress {
     std::atomic<std::size_t> next{0}, done{0};
     std::atomic<bool> has_failed{false};

@@ -221,8 +221,9 @@ PointTree::PointTree(PointsView<Real> points, int threads)
     : x_(points.n + kOverrun), y_(points.n + kOverrun), z_(points.n + kOverrun), rows_(points.n) {
   if (points.n == 0) throw std::invalid_argument("a point tree needs at least one point");
   if (points.n > std::numeric_limits<std::uint32_t>::max()) throw std::invalid_argument("a point tree holds 2^32 points");
-  const Bounds bounds = bounds_of(points.n, [&](std::size_t i) { return points[i]; }, threads);
+  const auto [bounds, sum] = survey(points.n, [&](std::size_t i) { return points[i]; }, threads);
   const Vec3 half = 0.5 * (bounds.hi - bounds.lo);
+  if (!is_finite(sum) || !is_finite(half)) throw std::invalid_argument("the points of a tree must be finite");
   centre_ = bounds.lo + half;
   if (const double longest = std::max({half.x, half.y, half.z}); longest > 0) unit_ = longest;
 

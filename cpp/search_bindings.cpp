@@ -111,7 +111,8 @@ nb::tuple plane_sums(Points<double> x, Points<double> own_normals, Points<double
   std::vector<double> sizes;
   for (std::size_t i = 0; i < n; ++i) {
     found[i] = residual(view(x)[i], view(own_normals)[i], 0, view(means)[i], view(normals)[i], loss);
-    if (found[i]) sizes.push_back(std::abs(found[i]->r) / spreads.data()[i]);
+    const double size = found[i] ? std::abs(found[i]->r) / spreads.data()[i] : std::numeric_limits<double>::quiet_NaN();
+    if (!std::isnan(size)) sizes.push_back(size);
   }
   if (!sizes.empty()) {
     const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
@@ -214,6 +215,8 @@ nb::tuple search_poses(const ClosestGrid& grid, const PairTable& table, Points<d
   if (confinement) {
     const auto guess = nb::cast<Matrices4>((*confinement)[0]);
     const auto pivot = nb::cast<Values>((*confinement)[1]);
+    if (guess.shape(0) < 1) throw std::invalid_argument("a confinement needs a guess");
+    check_lengths(3, {pivot.shape(0)});
     near = Confinement{pose_of(guess.data()), narrow({pivot.data()[0], pivot.data()[1], pivot.data()[2]}),
                        nb::cast<float>((*confinement)[2]), nb::cast<float>((*confinement)[3])};
   }
@@ -221,6 +224,8 @@ nb::tuple search_poses(const ClosestGrid& grid, const PairTable& table, Points<d
   if (freedoms) {
     const auto ends = nb::cast<Matrices4>((*freedoms)[0]);
     const auto mask = nb::cast<Values>((*freedoms)[2]);
+    check_lengths(2, {ends.shape(0)});
+    check_lengths(6, {mask.shape(0)});
     allowed = Freedoms{motion_of(ends.data()), motion_of(ends.data() + 16), nb::cast<bool>((*freedoms)[1]), {}, {}};
     std::copy_n(mask.data(), 3, allowed->turns.begin());
     std::copy_n(mask.data() + 3, 3, allowed->shifts.begin());

@@ -8,6 +8,7 @@
 #include <numbers>
 #include <vector>
 
+#include "casts.hpp"
 #include "points_view.hpp"
 #include "vec.hpp"
 
@@ -43,8 +44,7 @@ class Sight {
     const int axis = static_cast<int>(std::max_element(size, size + 3) - size);
     const auto index = [&](int aside) {
       const double angle = std::atan2(ray[aside % 3], size[axis]);
-      const int cell = static_cast<int>((angle / std::numbers::pi * 4 + 1) / 2 * cells_);
-      return static_cast<std::size_t>(std::clamp(cell, 0, cells_ - 1));
+      return static_cast<std::size_t>(cast_within((angle / std::numbers::pi * 4 + 1) / 2 * cells_, 0, cells_ - 1));
     };
     const std::size_t face = static_cast<std::size_t>(2 * axis + (ray[axis] < 0)), n = static_cast<std::size_t>(cells_);
     return (face * n + index(axis + 1)) * n + index(axis + 2);

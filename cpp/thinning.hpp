@@ -3,6 +3,7 @@
 
 #include <stdexcept>
 
+#include "casts.hpp"
 #include "radix_sort.hpp"
 #include "survey.hpp"
 
@@ -20,6 +21,7 @@ template <class Real>
 Thinned thin(PointsView<Real> points, Vec3 lo, Vec3 hi, double voxel, int threads) {
   const auto width = [&](double extent) {
     const double cells = extent / voxel + 1;
+    if (!(cells >= 1)) throw std::invalid_argument("bounds and voxel are none");
     if (!(cells < 2097152)) throw std::invalid_argument("voxel is less than 1 / 2097152 of the cloud's extent");
     int bits = 1;
     while ((1u << bits) < static_cast<std::uint32_t>(cells) + 1) ++bits;
@@ -31,8 +33,10 @@ Thinned thin(PointsView<Real> points, Vec3 lo, Vec3 hi, double voxel, int thread
   parallel_blocks(points.n, kPointBlock, threads, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const Vec3 p = points[i] - lo;
-      const auto cell = [&](double offset) { return static_cast<std::uint64_t>(offset / voxel); };
-      order[i] = {(cell(p.z) << (bx + by)) | (cell(p.y) << bx) | cell(p.x), static_cast<std::uint32_t>(i)};
+      const auto cell = [&](double offset, int bits) {
+        return cast_within<std::uint64_t>(offset / voxel, 0, (1u << bits) - 1);
+      };
+      order[i] = {(cell(p.z, bz) << (bx + by)) | (cell(p.y, by) << bx) | cell(p.x, bx), static_cast<std::uint32_t>(i)};
     }
   });
   radix_sort<std::uint64_t>(order, bx + by + bz, threads);

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "casts.hpp"
 #include "vec.hpp"
 
 namespace fieldalign {
@@ -12,10 +13,11 @@ struct Voxel {
   std::int32_t x, y, z;
 };
 
-// The greatest whole number not above v; std::floor is a call into the library on the oldest x86-64.
+// The greatest whole number not above v, of at most 2^30 either way, so that neighbours have numbers, too; std::floor is a
+// call into the library on the oldest x86-64.
 template <class Real>
 std::int32_t whole(Real v) {
-  const auto i = static_cast<std::int32_t>(v);
+  const auto i = cast_within<std::int32_t>(v, -(1 << 30), 1 << 30);
   return i - static_cast<std::int32_t>(v < static_cast<Real>(i));
 }
 
