@@ -10,6 +10,7 @@ import numpy as np
 
 from ...errors import CloudFileError
 from ..cloud import PointCloud
+from . import BLANKS
 from .triangles import Triangles, fans, fans_of, whole_numbers
 
 _HEAD = re.compile(rb"(?:ST)?C?N?OFF(\d*)")  # ModelNet40 has files that begin with "OFF490 518 0"
@@ -18,7 +19,7 @@ _HEAD = re.compile(rb"(?:ST)?C?N?OFF(\d*)")  # ModelNet40 has files that begin w
 def read_off(path: Path) -> tuple[PointCloud, Triangles]:
     """The vertices, and the triangles of the faces."""
     with path.open("rb") as file:
-        rows = (line for line in file if (line.partition(b"#")[0] if b"#" in line else line).strip())
+        rows = (line for line in file if (line.partition(b"#")[0] if b"#" in line else line).strip(BLANKS))
         words = next(rows, b"").partition(b"#")[0].split()
         head = _HEAD.fullmatch(words[0]) if words else None
         if head is None:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...errors import CloudFileError
 from ..cloud import Array, PointCloud
-from . import require_bytes, write_rows
+from . import require_bytes, table_of, write_rows
 from .columns import cloud_from_columns, columns_of
 
 ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
@@ -164,12 +164,7 @@ def _read_binary(file: BinaryIO, element: Element, order: str, present: int) -> 
 
 
 def _read_ascii(file: BinaryIO, element: Element, order: str, present: int) -> Array:
-    if not element.rows:
-        return np.empty(0, element.dtype(order))
-    rows = np.loadtxt(file, element.dtype(order), max_rows=element.rows, comments=None, ndmin=1)
-    if len(rows) != element.rows:
-        raise CloudFileError(f"promises {element.rows} vertices, but holds {len(rows)}")
-    return rows
+    return table_of(file, element.dtype(order), element.rows)
 
 
 def _narrowed(values: Array) -> Array:

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...errors import CloudFileError
 from ..cloud import PointCloud
+from . import BLANKS
 from .mesh import check_whole_stl, lines_after, read_obj
 
 Triangles = NDArray[np.int64]
@@ -77,7 +78,7 @@ def whole_numbers(rows: list[bytes], columns: Sequence[int] | None = None) -> Tr
 def _obj_table(lines: list[bytes]) -> Triangles | None:
     """The corners (F, k) of faces that all have k of them, counted from 1; None where they have not."""
     rows = _BESIDE_CORNERS.sub(b"", b"".join(lines)).splitlines()
-    table = whole_numbers(rows) if rows and rows[0].strip() else None
+    table = whole_numbers(rows) if rows and rows[0].strip(BLANKS) else None
     return table if table is not None and table.shape[1] >= 3 and table.min() > 0 else None
 
 
