@@ -90,12 +90,12 @@ inline ClosestGrid::ClosestGrid(std::vector<Plane> planes, float cell, float mar
   }
   const Vec3 rim{margin + cell, margin + cell, margin + cell};
   const Vec3 low = bounds.lo - rim, extent = bounds.hi + rim - low;
-  // Cells are found in float32: so far from the origin, its steps must still be shorter than they.
-  const double farthest = std::max({-low.x, -low.y, -low.z, low.x + extent.x, low.y + extent.y, low.z + extent.z});
-  if (!(farthest < cell * (1 << 23))) throw std::invalid_argument("the planes are too far from the origin for such cells");
   const auto blocks = [&](double length) { return std::floor(length / cell / (1 << kBits)) + 1; };
   const double columns = blocks(extent.x), rows = blocks(extent.y), layers = blocks(extent.z);
   if (!(columns * rows * layers <= kMostBlocks)) throw std::invalid_argument("the box holds too many cells");
+  // Cells are found in float32: so far from the origin, its steps must still be shorter than they.
+  const double farthest = std::max({-low.x, -low.y, -low.z, low.x + extent.x, low.y + extent.y, low.z + extent.z});
+  if (!(farthest < cell * (1 << 23))) throw std::invalid_argument("the planes are too far from the origin for such cells");
   lo_ = {static_cast<float>(low.x), static_cast<float>(low.y), static_cast<float>(low.z)};
   columns_ = static_cast<std::uint32_t>(columns), rows_ = static_cast<std::uint32_t>(rows);
   const auto last = [](double count) { return static_cast<float>(count * (1 << kBits) - 1); };
