@@ -48,7 +48,10 @@ class Dof:
         given = self.free
         if isinstance(given, str):
             given = given.replace(",", " ").split()
-        words = list(given) if isinstance(given, Iterable) else []
+        try:
+            words = list(given)
+        except TypeError:
+            words = []
         names = [name for word in words for name in (WORDS.get(word, (word,)) if isinstance(word, str) else (None,))]
         if not names or any(name not in NAMES for name in names):
             allowed = ", ".join((*NAMES, *WORDS))

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _core
-from .arguments import is_number
+from .arguments import as_array, as_numbers
 from .clouds.checks import Checked, checked_points
 from .dof import Dof
 from .errors import ArgumentError
@@ -41,7 +41,7 @@ class FlatCloud:
     """
 
     def __init__(self, points: ArrayLike, name: str, threads: int, drop_nonfinite: bool) -> None:
-        on_floor = np.asarray(points)
+        on_floor = as_array(points, name, "an (N, 2) array of numbers")
         if on_floor.dtype.kind not in "fiu":
             raise ArgumentError(f"{name} must be an (N, 2) array of real numbers, but has dtype {on_floor.dtype}")
         checked = checked_points(np.c_[on_floor, np.zeros(len(on_floor))], name, threads, drop_nonfinite)
@@ -114,18 +114,16 @@ def standing(source: FlatCloud, target: FlatCloud, scaled: bool) -> tuple[Prepar
 
 def upright(T: ArrayLike, name: str) -> Floats:
     """The (4, 4) motion of a (3, 3) one in the plane; raises ArgumentError where it is none."""
-    try:
-        flat = np.asarray(T, float)
-    except (TypeError, ValueError) as error:
-        raise ArgumentError(f"{name} must be a (3, 3) matrix of numbers, but is {T!r}") from error
+    flat = as_numbers(T, name, "a (3, 3) matrix of numbers")
     if flat.shape != (3, 3):
         raise ArgumentError(f"{name} must be a (3, 3) matrix for clouds in the plane, but has shape {flat.shape}")
     if not np.isfinite(flat).all():
         raise ArgumentError(f"{name} must be finite, but holds NaN or infinity")
     lifted = np.eye(4)
     lifted[:2, :2], lifted[:2, 3], lifted[3, [0, 1, 3]] = flat[:2, :2], flat[:2, 2], flat[2]
-    size = float(np.sqrt(abs(np.linalg.det(flat[:2, :2]))))
-    lifted[2, 2] = size if is_number(size) and size > 0 else 1.0
+    with np.errstate(over="ignore"):
+        size = float(np.sqrt(abs(np.linalg.det(flat[:2, :2]))))
+    lifted[2, 2] = size if size > 0 else 1.0
     return lifted
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .arguments import check_positive
+from .arguments import LARGEST, check_positive
 from .clouds.checks import warn_of_lost_precision
 from .clouds.cloud import PointCloud, as_points
 from .clouds.files import read_cloud
@@ -185,6 +185,9 @@ def _points_of(cloud: PointCloud | ArrayLike | str | os.PathLike[str]) -> NDArra
     if infinite.any():
         row = int(np.argmax(infinite))
         raise ArgumentError(f"cloud must be finite, or NaN where nothing returned, but row {row} is {points[row]}")
+    largest = float(np.nanmax(np.abs(points), initial=0))
+    if largest > LARGEST:
+        raise ArgumentError(f"cloud must have coordinates below {LARGEST:g}, but has {largest:g}")
     if np.isnan(points).any(axis=1).all():
         raise ArgumentError(f"cloud must have points, but none of its {len(points)} rows is one")
     warn_of_lost_precision(points, np.array([np.nanmin(points, axis=0), np.nanmax(points, axis=0)]), "cloud")

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core
+from .arguments import LARGEST, as_numbers
 from .errors import ArgumentError
 
 Matrix = NDArray[np.float64]
@@ -170,26 +171,16 @@ def rotation_between(a: Matrix, b: Matrix) -> Matrix:
 
 def as_similar(T: ArrayLike, name: str) -> Matrix:
     """T as a similarity (4, 4), float64: a rigid motion of places times a positive factor; raises ArgumentError."""
-    try:
-        matrix = np.array(T, float)
-    except (TypeError, ValueError):
-        return as_rigid(T, name)  # which says what is wrong
-    if matrix.shape != (4, 4) or not np.isfinite(matrix).all() or not size_of(matrix) > 0:
-        return as_rigid(T, name)
+    matrix = _as_pose(T, name)
     size = size_of(matrix)
+    if not 0 < size < LARGEST:
+        return as_rigid(T, name)  # which says what is wrong
     return as_rigid(matrix @ growth(1 / size), name) @ growth(size)
 
 
 def as_rigid(T: ArrayLike, name: str) -> Matrix:
     """T as a rigid motion (4, 4), float64; raises ArgumentError that names the argument where it is none."""
-    try:
-        matrix = np.array(T, float)
-    except (TypeError, ValueError) as error:
-        raise ArgumentError(f"{name} must be a (4, 4) matrix of numbers, but is {T!r}") from error
-    if matrix.shape != (4, 4):
-        raise ArgumentError(f"{name} must be a (4, 4) matrix, but has shape {matrix.shape}")
-    if not np.isfinite(matrix).all():
-        raise ArgumentError(f"{name} must be finite, but holds NaN or infinity")
+    matrix = _as_pose(T, name)
     if not np.allclose(matrix[3], [0, 0, 0, 1], atol=1e-9):
         raise ArgumentError(f"{name} must end in the row 0 0 0 1, but ends in {matrix[3]}")
     R = matrix[:3, :3]
@@ -201,4 +192,16 @@ def as_rigid(T: ArrayLike, name: str) -> Matrix:
         )
     matrix[:3, :3] = nearest_rotation(R)  # a pose that was written with few digits
     matrix[3] = [0, 0, 0, 1]
+    return matrix
+
+
+def _as_pose(T: ArrayLike, name: str) -> Matrix:
+    """A (4, 4) matrix of numbers of which none is so large that products of two overflow."""
+    matrix = as_numbers(T, name, "a (4, 4) matrix of numbers")
+    if matrix.shape != (4, 4):
+        raise ArgumentError(f"{name} must be a (4, 4) matrix, but has shape {matrix.shape}")
+    if not np.isfinite(matrix).all():
+        raise ArgumentError(f"{name} must be finite, but holds NaN or infinity")
+    if np.abs(matrix).max() > LARGEST:
+        raise ArgumentError(f"{name} must hold numbers below {LARGEST:g}, but holds {np.abs(matrix).max():g}")
     return matrix

@@ -70,7 +70,7 @@ def prepare_named(
     if isinstance(cloud, DistanceField):
         return PreparedCloud(cloud, threads=threads)
     if is_flat(cloud):
-        return FlatCloud(np.asarray(cloud), name, resolve_threads(threads), drop_nonfinite)
+        return FlatCloud(cloud, name, resolve_threads(threads), drop_nonfinite)
     points, eye = _parts_of(cloud)
     checked = checked_points(points, name, resolve_threads(threads), drop_nonfinite)
     return PreparedCloud(PointField(checked, threads=threads), checked.dropped, threads, eye)

@@ -8,9 +8,8 @@ import numpy as np
 
 from . import _core
 from .alignment.residual import row_dot
-from .errors import ArgumentError
 from .fields import DistanceField, FieldSample, PointField, sampled, spread_over
-from .fields.protocol import Floats, Planes, exact_planes, planes_near
+from .fields.protocol import Floats, Planes, bounds_of, exact_planes, planes_near
 from .lazy import lazy
 from .pseudo import draw_pseudo_points
 from .scale import Scale, scale_of, within
@@ -59,12 +58,12 @@ class PreparedCloud:
         """Where the cloud lies, (3,): its mean, or the middle of a field's bounds."""
         if isinstance(self.field, PointField):
             return self.field.centre
-        return np.asarray(np.mean(_bounds(self.field), axis=0))
+        return np.asarray(np.mean(bounds_of(self.field), axis=0))
 
     @lazy
     def extent(self) -> float:
         """The diagonal of the bounding box."""
-        low, high = _bounds(self.field)
+        low, high = bounds_of(self.field)
         return float(np.linalg.norm(high - low))
 
     @lazy
@@ -183,10 +182,3 @@ def _moments(cloud: PointField) -> Floats:
     away = np.asarray(cloud.points, float) - cloud.centre
     squared = row_dot(away, away)
     return np.array([squared.mean(), (squared**2).mean()])
-
-
-def _bounds(field: DistanceField) -> Floats:
-    bounds = np.asarray(field.bounds, float)
-    if bounds.shape != (2, 3) or not np.isfinite(bounds).all() or not (bounds[0] <= bounds[1]).all():
-        raise ArgumentError(f"{type(field).__name__}.bounds must be (2, 3), lowest and highest corner, but is {bounds}")
-    return bounds

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arguments import MAX_NEIGHBOURS, as_count, check_one_of, check_positive, is_number
+from .arguments import MAX_NEIGHBOURS, MAX_PLACES, as_count, check_one_of, check_positive, is_number
 from .clouds.cloud import as_points
 from .errors import ArgumentError
 
@@ -75,11 +75,11 @@ class Settings:
         if self.sigma is not None:
             check_positive("sigma", self.sigma)
         for name, lowest in (("pseudo_count", 6), ("irls_steps", 1), ("min_kept", 6), ("max_iterations", 1)):
-            as_count(getattr(self, name), name, lowest)
+            as_count(getattr(self, name), name, lowest, MAX_PLACES)
         as_count(self.neighbours, "neighbours", 1, MAX_NEIGHBOURS)
         as_count(self.normal_neighbours, "normal_neighbours", 3, MAX_NEIGHBOURS)
         if self.share_limit is not None:
-            as_count(self.share_limit, "share_limit", 1)
+            as_count(self.share_limit, "share_limit", 1, MAX_PLACES)
         if not is_number(self.min_cosine) or not -1 <= self.min_cosine < 1:
             raise ArgumentError(f"min_cosine must be a number in [-1, 1), but is {self.min_cosine!r}")
         if not isinstance(self.irls, bool):

@@ -9,13 +9,15 @@ from typing import Any
 
 from .arguments import as_count
 
+_MOST = 1024  # that are of use to anyone
+
 
 def resolve_threads(threads: int | None) -> int:
     """`threads` itself, or for None as many as this process may use; raises ArgumentError for less than 1."""
     if threads is None:
         affinity = getattr(os, "sched_getaffinity", None)  # not on macOS and Windows
         return len(affinity(0)) if affinity else os.cpu_count() or 1
-    return as_count(threads, "threads", 1)
+    return min(as_count(threads, "threads", 1), _MOST)
 
 
 def side_by_side(threads: int, *tasks: Callable[[], Any]) -> list[Any]:

@@ -156,7 +156,7 @@ def test_a_voxel_of_any_number_type(rng):
 
 @pytest.mark.parametrize("voxel", [0, -1.0, np.nan, np.inf, "1", None, np.ones(1)])
 def test_a_voxel_that_is_no_length_is_refused(voxel):
-    with pytest.raises(ArgumentError, match=r"^voxel must be a positive length"):
+    with pytest.raises(ArgumentError, match=r"^voxel must be a positive number"):
         thin(np.eye(3), voxel)
 
 

@@ -335,7 +335,7 @@ WALL = nodes((4, 5, 6), np.zeros(3), 1.0)[..., 0] - 1.3
         ("volume", r"must be \(I, J, K\) numbers with sides of at least 2, but have shape \(\)"),
         (np.zeros((4, 4)), r"shape \(4, 4\)"),
         (np.zeros((1, 4, 4)), r"shape \(1, 4, 4\)"),
-        ([[1, 2], [3]], "are no array"),
+        ([[1, 2], [3]], "rows differ"),
         (WALL > 0, "dtype bool"),
         (WALL + 1j, "dtype complex"),
         (np.where(WALL > 0, np.inf, WALL), "have infinity"),

@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import _core
+from ..arguments import LARGEST
 from ..errors import ArgumentError
 from .cloud import as_points
-
-LARGEST = 1e15  # of a coordinate: beyond, float64 leaves less than a unit of resolution
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arguments import as_array, as_numbers
 from ..errors import ArgumentError
-from ..motions import size_of
+from ..motions import as_similar, size_of
 
 Array = NDArray[Any]
 
@@ -51,7 +52,7 @@ class PointCloud:
             for key, value in (self.attributes or {}).items()
         }
         if self.viewpoint is not None:
-            checked["viewpoint"] = np.asarray(self.viewpoint, float)
+            checked["viewpoint"] = as_numbers(self.viewpoint, "viewpoint", "a (4, 4) pose")
             if checked["viewpoint"].shape != (4, 4):
                 raise ArgumentError(f"viewpoint must be a (4, 4) pose, but has shape {checked['viewpoint'].shape}")
         for name, value in checked.items():
@@ -73,9 +74,11 @@ class PointCloud:
 
     def transformed(self, T: ArrayLike) -> PointCloud:
         """The cloud moved by T (4, 4), a rigid motion or a similarity: points, normals and viewpoint; points become
-        float64."""
-        T = np.asarray(T, float)
-        moved = np.asarray(self.points, float) @ T[:3, :3].T + T[:3, 3]
+        float64. Raises ArgumentError where T is neither."""
+        as_similar(T, "T")
+        T = as_numbers(T, "T")
+        with np.errstate(over="ignore", invalid="ignore"):  # rows that are not finite are missing returns
+            moved = np.asarray(self.points, float) @ T[:3, :3].T + T[:3, 3]
         turn = np.eye(4)
         turn[:3, :3] = T[:3, :3] / size_of(T)
         normals = None if self.normals is None else self.normals @ turn[:3, :3].T
@@ -88,20 +91,18 @@ class PointCloud:
 
 def as_points(values: ArrayLike, name: str) -> Array:
     """An (N, 3) C-contiguous float32 or float64 array of `values`; raises ArgumentError that names the argument."""
-    try:
-        array = np.asarray(values)
-    except ValueError as error:  # ragged rows
-        raise ArgumentError(f"{name} must be an (N, 3) array of numbers, but its rows differ in length") from error
+    array = as_array(values, name, "an (N, 3) array of numbers")
     if array.dtype.kind not in "fiu":
         raise ArgumentError(f"{name} must be an (N, 3) array of real numbers, but has dtype {array.dtype}")
     if array.ndim != 2 or array.shape[1] != 3:
         raise ArgumentError(f"{name} must have shape (N, 3), but has shape {array.shape}")
-    return np.ascontiguousarray(array, np.float32 if array.dtype.newbyteorder("=") == np.float32 else np.float64)
+    with np.errstate(over="ignore"):  # of extended precision: it becomes infinite
+        return np.ascontiguousarray(array, np.float32 if array.dtype.newbyteorder("=") == np.float32 else np.float64)
 
 
 def _per_point(values: ArrayLike, name: str, n: int, widths: tuple[int, ...] | None) -> Array:
     """An array of n rows; `widths` are the allowed second dimensions, () means one value per point, None anything."""
-    array = np.asarray(values)
+    array = as_array(values, name, f"an array of {n} rows")
     allowed = {(n, w) for w in widths} if widths else {(n,)}
     fits = array.shape in allowed if widths is not None else array.shape[:1] == (n,)
     if not fits:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import _core
+from ..arguments import check_positive
 from ..errors import ArgumentError
 from ..threads import resolve_threads
 from .checks import warn_of_lost_precision, without_missing
@@ -23,8 +24,7 @@ def thin(cloud: PointCloud | ArrayLike, voxel: float, *, threads: int | None = N
 
     Raises ArgumentError for a voxel that is not positive or below 1 / 2097152 of the extent, and for infinite points.
     """
-    if not isinstance(voxel, int | float | np.number) or not (np.isfinite(voxel) and voxel > 0):
-        raise ArgumentError(f"voxel must be a positive length, but is {voxel!r}")
+    check_positive("voxel", voxel)
     given = cloud if isinstance(cloud, PointCloud) else PointCloud(as_points(cloud, "cloud"))
     cores = resolve_threads(threads)
     points = without_missing(given.points, "cloud", cores)

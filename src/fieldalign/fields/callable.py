@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import LARGEST, as_numbers
 from ..errors import ArgumentError, FieldError
-from .protocol import FieldSample, Floats, Planes, exact_planes, newton_foot, unit
+from .protocol import FieldSample, Floats, Planes, as_places, exact_planes, newton_foot, unit
 from .spread import spread_by
 from .torch_module import as_torch_module
 
@@ -66,7 +67,7 @@ class CallableField:
 
         Raises FieldError where the function raises or answers nonsense.
         """
-        places = np.ascontiguousarray(x, float)
+        places = as_places(x)
         value, gradient = self._values_and_gradients(places)
         foot = newton_foot(places, value, gradient)
         return FieldSample(value, gradient, foot, lambda: self._normals(foot))
@@ -110,7 +111,7 @@ class CallableField:
 
 def _asked(function: Callable[[Floats], Any], name: str, places: Floats, shape: tuple[int, ...]) -> Floats:
     """What a function says of the places; raises FieldError for what is no answer."""
-    return _checked(_tried(lambda x: np.asarray(function(x), float), name, places), name, shape)
+    return _checked(_tried(lambda x: as_numbers(function(x), "it"), name, places), name, shape)
 
 
 def _tried(function: Callable[[Floats], Any], name: str, places: Floats) -> Any:
@@ -129,10 +130,7 @@ def _checked(answer: Floats, name: str, shape: tuple[int, ...]) -> Floats:
 
 
 def _checked_bounds(bounds: ArrayLike) -> Floats:
-    try:
-        corners = np.array(bounds, float)
-    except (TypeError, ValueError) as error:
-        raise ArgumentError(f"bounds must be (2, 3) numbers, but is {bounds!r}") from error
-    if corners.shape != (2, 3) or not np.isfinite(corners).all() or not (corners[0] < corners[1]).all():
+    corners = as_numbers(bounds, "bounds", "(2, 3) numbers")
+    if corners.shape != (2, 3) or not (np.abs(corners) <= LARGEST).all() or not (corners[0] < corners[1]).all():
         raise ArgumentError(f"bounds must be (2, 3), the lowest and the highest corner of a box, but is {bounds!r}")
     return corners

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arguments import as_count
+from ..arguments import as_array, as_count
 from ..errors import FieldError, missing_extra
 from ..lazy import lazy
-from .protocol import FieldSample, Floats, Planes, exact_planes, unit
+from .protocol import FieldSample, Floats, Planes, as_places, exact_planes, unit
 
 Rows = NDArray[np.int64]
 
@@ -61,7 +61,7 @@ class MeshField:
     def sample(self, x: ArrayLike) -> FieldSample:
         """value (L,), gradient (L, 3), foot (L, 3) and normal (L, 3) at the places x (L, 3); the normal is that of the
         nearest triangle. On the surface itself a signed field's gradient is the normal, and an unsigned one's zero."""
-        places = np.ascontiguousarray(x, float) - self.centre
+        places = as_places(x) - self.centre
         face, foot = self._nearest(places)
         away = places - foot
         value = np.sqrt(np.einsum("li,li->l", away, away))
@@ -178,15 +178,16 @@ def _sums(rows: Rows, vectors: Floats, count: int) -> Floats:
 
 def _checked(vertices: ArrayLike, faces: ArrayLike) -> tuple[Floats, Rows]:
     """Vertices (V, 3) and faces (F, 3), copied; raises FieldError where they are none."""
-    V, F = _array(vertices, "vertices"), _array(faces, "faces")
+    V, F = (as_array(array, f"{name} of a MeshField", "(n, 3)", FieldError) for name, array in
+            (("vertices", vertices), ("faces", faces)))
     for name, array, kinds in (("vertices", V, "fiu"), ("faces", F, "iu")):
         wanted = "numbers" if kinds == "fiu" else "whole numbers"
         if array.dtype.kind not in kinds or array.ndim != 2 or array.shape[1] != 3:
             raise FieldError(
                 f"{name} of a MeshField must be (n, 3) {wanted}, but have shape {array.shape} and dtype {array.dtype}"
             )
-        if not len(array):
-            raise FieldError(f"MeshField needs at least one triangle, but has {len(F)} faces on {len(V)} vertices")
+    if not len(V) or not len(F):
+        raise FieldError(f"MeshField needs at least one triangle, but has {len(F)} faces on {len(V)} vertices")
     if F.min() < 0 or F.max() >= len(V):
         raise FieldError(f"faces of a MeshField must be rows of its {len(V)} vertices, but are {F.min()} to {F.max()}")
     bad = ~np.isfinite(V[F]).all(axis=(1, 2)) if V.dtype.kind == "f" else np.zeros(len(F), bool)
@@ -203,13 +204,6 @@ def _with_an_area(vertices: Floats, faces: Rows) -> Rows:
     if not kept.any():
         raise FieldError(f"MeshField needs triangles with an area, but none of its {len(faces)} has one")
     return np.asarray(faces[kept])
-
-
-def _array(values: ArrayLike, name: str) -> NDArray[Any]:
-    try:
-        return np.array(values)
-    except ValueError as error:  # ragged rows
-        raise FieldError(f"{name} of a MeshField must be (n, 3), but its rows differ in length") from error
 
 
 def _doubled_areas(vertices: Floats, faces: Rows) -> Floats:

@@ -12,7 +12,7 @@ from ..arguments import MAX_NEIGHBOURS, as_count
 from ..clouds.checks import Checked, checked_points
 from ..lazy import lazy
 from ..threads import resolve_threads
-from .protocol import FieldSample, Floats, Planes
+from .protocol import FieldSample, Floats, Planes, as_places
 
 
 class PointField:
@@ -63,14 +63,13 @@ class PointField:
         guess: (L,), `place` of an earlier sample of points nearby; it halves the time and changes nothing else.
         """
         value, gradient, foot, place = self.tree.sample(
-            np.ascontiguousarray(x, float), self.neighbours, guess, self.threads
+            as_places(x), self.neighbours, guess, self.threads
         )
         return FieldSample(value, gradient, foot, lambda: self.normals(foot), place)
 
     def nearest(self, x: ArrayLike, neighbours: int = 1) -> tuple[Floats, NDArray[np.int64]]:
         """Distances (L, k) and rows (L, k) of the k nearest points to the places x (L, 3), nearest first."""
-        places = np.ascontiguousarray(x, float)
-        return self.tree.nearest(places, as_count(neighbours, "neighbours", 1, MAX_NEIGHBOURS), self.threads)
+        return self.tree.nearest(as_places(x), as_count(neighbours, "neighbours", 1, MAX_NEIGHBOURS), self.threads)
 
     def normals(self, x: ArrayLike) -> Floats:
         """Unit normals (L, 3) of the planes through the nearest points to the places x (L, 3); sign free."""

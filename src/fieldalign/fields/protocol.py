@@ -8,9 +8,11 @@ from functools import cached_property
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from .. import _core
+from ..arguments import LARGEST, as_numbers
+from ..clouds.cloud import as_points
 from ..errors import FieldError
 
 Floats = NDArray[np.float64]
@@ -103,6 +105,25 @@ class HasSpread(Protocol):
         ...
 
 
+def as_places(x: ArrayLike) -> Floats:
+    """Places (L, 3) that a field can be asked at; raises ArgumentError for what is none, and FieldError where a
+    coordinate is not finite, or beyond what float64 resolves."""
+    places = np.ascontiguousarray(as_points(x, "x"), float)
+    if not np.abs(places).max(initial=0.0) <= LARGEST:
+        raise FieldError(f"a field must be asked at finite places below {LARGEST:g}, but x has NaN or infinity or more")
+    return places
+
+
+def bounds_of(field: DistanceField) -> Floats:
+    """The corners (2, 3) of the box around a field's surface; raises FieldError where it says none."""
+    name = f"{type(field).__name__}.bounds"
+    wanted = "(2, 3), lowest and highest corner"
+    bounds = as_numbers(field.bounds, name, wanted, FieldError)
+    if bounds.shape != (2, 3) or not (np.abs(bounds) <= LARGEST).all() or not (bounds[0] <= bounds[1]).all():
+        raise FieldError(f"{name} must be {wanted}, but is {bounds}")
+    return bounds
+
+
 def sampled(field: DistanceField, x: Floats, last: FieldSample | None = None) -> FieldSample:
     """A field at the places x (L, 3), as a FieldSample; raises FieldError where a foreign field answers nonsense.
 
@@ -183,5 +204,6 @@ def _from_tuple(field: DistanceField, answer: Any) -> FieldSample:
     parts = list(answer) if isinstance(answer, tuple | list) else []
     if len(parts) != 4:
         raise FieldError(f"{type(field).__name__}.sample must give four arrays, but gave {answer!r}")
-    value, gradient, foot, normal = (np.asarray(part, float) for part in parts)
+    name, wanted = f"an answer of {type(field).__name__}.sample", "an array of numbers"
+    value, gradient, foot, normal = (as_numbers(part, name, wanted, FieldError) for part in parts)
     return FieldSample(value, gradient, foot, normal)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..errors import FieldError
-from .protocol import DistanceField, Floats, HasSpread, newton_foot, sampled
+from .protocol import DistanceField, Floats, HasSpread, bounds_of, newton_foot, sampled
 
 _FIRST = 16     # cells along the longest edge of the box
 _STRAY = 1.2    # half diagonals of a cell: if the surface is nearer, by what is nearly a distance, it may cross
@@ -26,7 +26,7 @@ def spread_over(field: DistanceField, count: int) -> Floats:
     return spread_by(
         lambda x: sampled(field, x).value,
         lambda x: sampled(field, x).gradient,
-        np.asarray(field.bounds, float), count, type(field).__name__,
+        bounds_of(field), count, type(field).__name__,
     )
 
 
@@ -57,6 +57,8 @@ def _cells_near(
     """Centres (n, 3) of at least `count` cells that the surface may cross, and their edge."""
     low, high = bounds
     edge = float((high - low).max()) / _FIRST
+    if not edge > 0:
+        raise FieldError(f"{name} has bounds without an extent: {low} to {high}")
     numbers = np.maximum(np.ceil((high - low) / edge).astype(int), 1)
     centres = low + (np.indices(numbers).reshape(3, -1).T + 0.5) * edge
     found = values(centres)

@@ -12,7 +12,7 @@ from ..arguments import as_count, check_one_of, check_positive
 from ..errors import ArgumentError, FieldError
 from .blocks import Blocks
 from .points import PointField
-from .protocol import FieldSample, Floats, newton_foot, unit
+from .protocol import FieldSample, Floats, as_places, newton_foot, unit
 from .volume_checks import checked_mask, checked_numbers, checked_origin, checked_spacing, known_values
 
 _TAPS = {"linear": 2, "cubic": 4}
@@ -118,9 +118,7 @@ class VolumeField:
 
     def sample(self, x: ArrayLike) -> FieldSample:
         """value (L,), gradient (L, 3), foot (L, 3) and normal (L, 3) at the places x (L, 3)."""
-        places = np.ascontiguousarray(x, float)
-        if not np.isfinite(places).all():
-            raise FieldError("VolumeField.sample must be asked for finite places, but x has NaN or infinity")
+        places = as_places(x)
         value, gradient = self._interpolated(places)
         foot = newton_foot(places, value, gradient)
         lost = self._lost(value, gradient)

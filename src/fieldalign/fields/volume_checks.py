@@ -7,18 +7,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arguments import LARGEST, as_array, as_numbers
 from ..errors import ArgumentError, FieldError
 from .protocol import Floats
 
+_SHORTEST = 1e-150  # step: its square is a number still
 _ROUNDED = 1 - 1e-6  # of the truncation: a value of this size is meant to be truncated
 
 
 def checked_numbers(given: ArrayLike, name: str, shape: str, dimensions: int) -> NDArray[Any]:
     """Numbers as float32 where they are that or shorter, else as float64; raises FieldError for what is no volume."""
-    try:
-        numbers = np.asarray(given)
-    except ValueError as error:
-        raise FieldError(f"{name} of a VolumeField must be {shape} numbers, but are no array: {error}") from error
+    numbers = as_array(given, f"{name} of a VolumeField", f"{shape} numbers", FieldError)
     if numbers.dtype.kind not in "fiu" or numbers.ndim != dimensions or min(numbers.shape[-3:]) < 2:
         raise FieldError(
             f"{name} of a VolumeField must be {shape} numbers with sides of at least 2, "
@@ -30,7 +29,7 @@ def checked_numbers(given: ArrayLike, name: str, shape: str, dimensions: int) ->
 
 def checked_mask(seen: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.bool_]:
     """Which values were seen; raises FieldError for what is no mask of them."""
-    mask = np.asarray(seen)
+    mask = as_array(seen, "seen of a VolumeField", f"{shape} bool", FieldError)
     if mask.dtype != bool or mask.shape != shape:
         raise FieldError(
             f"seen of a VolumeField must be {shape} bool as its values are, but has shape {mask.shape} and dtype "
@@ -41,22 +40,16 @@ def checked_mask(seen: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.bool_]:
 
 def checked_origin(origin: ArrayLike) -> Floats:
     """The place of the first value (3,); raises ArgumentError for what is none."""
-    try:
-        place = np.array(origin, float)
-    except (TypeError, ValueError) as error:
-        raise ArgumentError(f"origin must be (3,) numbers, but is {origin!r}") from error
-    if place.shape != (3,) or not np.isfinite(place).all():
+    place = as_numbers(origin, "origin", "(3,) numbers")
+    if place.shape != (3,) or not (np.abs(place) <= LARGEST).all():
         raise ArgumentError(f"origin must be (3,) finite numbers, but is {origin!r}")
     return place
 
 
 def checked_spacing(spacing: ArrayLike) -> Floats:
     """The steps along the axes (3,), from three or one for all; raises ArgumentError for what is none."""
-    try:
-        steps = np.array(spacing, float)
-    except (TypeError, ValueError) as error:
-        raise ArgumentError(f"spacing must be a positive number or three, but is {spacing!r}") from error
-    if steps.shape not in ((), (3,)) or not (np.isfinite(steps) & (steps > 0)).all():
+    steps = as_numbers(spacing, "spacing", "a positive number or three")
+    if steps.shape not in ((), (3,)) or not ((steps > _SHORTEST) & (steps <= LARGEST)).all():
         raise ArgumentError(f"spacing must be a positive number or three, but is {spacing!r}")
     return np.full(3, steps)
 
@@ -73,6 +66,8 @@ def known_values(numbers: NDArray[Any], seen: NDArray[np.bool_] | None, truncati
     finite = known[np.isfinite(known)]
     if not finite.size:
         raise FieldError("VolumeField needs values that are seen and below the truncation, but has none")
+    if np.abs(finite).max() > LARGEST:
+        raise FieldError(f"values of a VolumeField must be below {LARGEST:g}, but reach {np.abs(finite).max():g}")
     if finite.min() == finite.max():
         raise FieldError(
             f"values of a VolumeField must differ from place to place, but all that are known are {finite[0]}"

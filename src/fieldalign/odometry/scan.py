@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import _core
+from ..arguments import as_numbers, is_number
 from ..clouds.cloud import PointCloud, as_points
 from ..errors import ArgumentError
 from ..fields.protocol import Floats
@@ -84,6 +85,8 @@ def sweep_of(
 
     cloud: None is a scan that is missing. ahead: seconds from the stamp to the middle, where there are no times.
     """
+    if stamp is not None and not (is_number(stamp) and np.isfinite(stamp)):
+        raise ArgumentError(f"stamp must be a finite number of seconds, but is {stamp!r}")
     if cloud is None:
         return replace(_timeless(np.zeros((0, 3), np.float32), stamp, ahead), is_missing=True)
     points = cloud.points if isinstance(cloud, PointCloud) else as_points(cloud, "cloud")
@@ -91,7 +94,7 @@ def sweep_of(
         times = cloud.times
     if times is None or not len(points):
         return _timeless(points, stamp, ahead)
-    seconds = np.ascontiguousarray(times, float)
+    seconds = as_numbers(times, "times")
     if seconds.shape != (len(points),):
         raise ArgumentError(f"times must have shape ({len(points)},), one for each point, but has {seconds.shape}")
     first, last = float(seconds.min()), float(seconds.max())

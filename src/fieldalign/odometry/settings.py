@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..arguments import as_count, check_positive
+from ..arguments import MAX_PLACES, as_count, check_positive
 
 
 @dataclass(frozen=True)
@@ -26,5 +26,5 @@ class OdometrySettings:
     def __post_init__(self) -> None:
         if self.voxel is not None:
             check_positive("voxel", self.voxel)
-        as_count(self.pseudo_points, "pseudo_points", 100)
-        as_count(self.points, "points", 1000)
+        as_count(self.pseudo_points, "pseudo_points", 100, MAX_PLACES)
+        as_count(self.points, "points", 1000, MAX_PLACES)

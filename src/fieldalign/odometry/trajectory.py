@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
+from ..arguments import LARGEST, as_numbers
 from ..errors import ArgumentError
 from ..motions import Matrix, inverse
 
@@ -32,7 +32,7 @@ class Trajectory:
     has_times: bool = True
 
     def __post_init__(self) -> None:
-        times, poses = _numbers(self.times, "times"), _numbers(self.poses, "poses")
+        times, poses = as_numbers(self.times, "times"), as_numbers(self.poses, "poses")
         if times.ndim != 1:
             raise ArgumentError(f"times must have shape (n,), but has shape {times.shape}")
         _check_shape(poses, (len(times), 4, 4), "poses")
@@ -41,7 +41,7 @@ class Trajectory:
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "poses", poses)
         if self.covariances is not None:
-            covariances = _numbers(self.covariances, "covariances")
+            covariances = as_numbers(self.covariances, "covariances")
             _check_shape(covariances, (len(times), 6, 6), "covariances")
             object.__setattr__(self, "covariances", covariances)
 
@@ -77,13 +77,6 @@ class Trajectory:
         return f"Trajectory({len(self)} poses over {self.distances[-1] if len(self) else 0.0:.6g})"
 
 
-def _numbers(values: ArrayLike, name: str) -> Matrix:
-    try:
-        return np.array(values, float)
-    except (TypeError, ValueError) as error:
-        raise ArgumentError(f"{name} must be an array of numbers, but is no such thing: {error}") from error
-
-
 def _check_shape(array: Matrix, shape: tuple[int, ...], name: str) -> None:
     if array.shape != shape:
         raise ArgumentError(f"{name} must have shape {shape} to go with {shape[0]} times, but has shape {array.shape}")
@@ -98,8 +91,11 @@ def _check_finite(array: Matrix, name: str) -> None:
 def _check_rigid(poses: Matrix) -> None:
     _check_finite(poses, "poses")
     R = poses[:, :3, :3]
-    off = np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max(axis=(1, 2), initial=0.0)
-    bad = (off > _LOOSEST) | (np.linalg.det(R) < 0) | (poses[:, 3] != [0, 0, 0, 1]).any(axis=1)
+    with np.errstate(over="ignore", invalid="ignore"):
+        off = np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max(axis=(1, 2), initial=0.0)
+        is_mirrored = np.linalg.det(R) < 0
+    far = np.abs(poses[:, :3, 3]).max(axis=1, initial=0.0) > LARGEST
+    bad = ~(off <= _LOOSEST) | is_mirrored | far | (poses[:, 3] != [0, 0, 0, 1]).any(axis=1)
     if bad.any():
         row = int(np.flatnonzero(bad)[0])
         raise ArgumentError(f"poses must be rigid motions, but poses[{row}] is none: {poses[row].tolist()}")
