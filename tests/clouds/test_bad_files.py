@@ -438,3 +438,47 @@ def test_what_a_file_says_of_itself_does_nothing_to_a_terminal(read, tmp_path):
             read(tmp_path / name)
         assert str(caught.value).isprintable()
         assert "hacked" in str(caught.value)
+
+
+# What fuzz/readers.py found.
+
+
+def test_an_npy_whose_header_has_two_gigabytes(tmp_path):
+    """NumPy would make room for it."""
+    content = b"\x93NUMPY\x02\x00" + struct.pack("<I", 2**31 - 1) + b"{'descr': '<f8', 'shape': (4, 3), }" + bytes(99)
+    (tmp_path / "a.npy").write_bytes(content)
+    assert "a header" in refused(tmp_path / "a.npy")
+    with zipfile.ZipFile(tmp_path / "a.npz", "w") as archive:
+        archive.writestr("points.npy", content)
+    refused(tmp_path / "a.npz")
+
+
+def test_a_pcd_with_more_lines_than_usual_is_read_where_its_data_are(tmp_path):
+    """pypcd4 takes the eleventh line of a header for data, and what stands there for a size."""
+    for encoding in ("binary", "binary_compressed"):
+        data = lie(pcd_of_50_points(tmp_path / "a.pcd", encoding), b"VERSION", b"AUTHOR a\nPLACE b\nVERSION")
+        (tmp_path / "b.pcd").write_bytes(data)
+        assert np.array_equal(read_cloud(tmp_path / "b.pcd").points[:, 1], np.arange(50))
+
+
+def test_a_pcd_whose_compressed_data_are_damaged(tmp_path):
+    data = bytearray(pcd_of_50_points(tmp_path / "a.pcd", "binary_compressed"))
+    data[data.index(b"compressed\n") + 19 :] = b"\xff" * (len(data) - data.index(b"compressed\n") - 19)
+    (tmp_path / "b.pcd").write_bytes(data)
+    refused(tmp_path / "b.pcd")
+
+
+def test_empty_lines_among_rows_are_passed_over_without_a_word(tmp_path):
+    head = b"ply\nformat ascii 1.0\nelement vertex 2\n" + PLY_HEAD
+    (tmp_path / "a.ply").write_bytes(head + b"\n1 2 3\n \x1e \n4 5 6\n")
+    assert np.array_equal(read_cloud(tmp_path / "a.ply").points, [[1, 2, 3], [4, 5, 6]])
+    data = pcd_of_50_points(tmp_path / "a.pcd", "ascii")
+    start = data.index(b"ascii\n") + 6
+    (tmp_path / "a.pcd").write_bytes(data[:start] + b"\n\n" + data[start:])
+    assert len(read_cloud(tmp_path / "a.pcd").points) == 50
+
+
+def test_colours_that_are_no_colours(tmp_path):
+    head = "VERSION .7\nFIELDS x y z rgb\nSIZE 4 4 4 8\nTYPE F F F F\nCOUNT 1 1 1 1\nWIDTH 2\nHEIGHT 1\nPOINTS 2\n"
+    (tmp_path / "a.pcd").write_text(head + "DATA ascii\n1 2 3 1e300\n4 5 6 nan\n")
+    assert len(read_cloud(tmp_path / "a.pcd")) == 2

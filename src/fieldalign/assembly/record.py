@@ -174,9 +174,20 @@ def _encoded(entry: Mapping[str, Any]) -> bytes:
 
 
 def _decoded(line: bytes) -> dict[str, Any] | None:
-    """What a line holds; None where it is torn or damaged."""
+    """What a line holds; None where it is torn, damaged or no line of a record."""
     text = line[9:-1]
     if not line.endswith(b"\n") or line[:9] != b"%08x " % zlib.crc32(text):
         return None
-    entry: dict[str, Any] = json.loads(text)
-    return entry
+    try:
+        entry: Any = json.loads(text)
+    except (ValueError, RecursionError):
+        return None
+    return entry if _is_entry(entry) else None
+
+
+def _is_entry(entry: Any) -> bool:
+    if not isinstance(entry, dict):
+        return False
+    if "run" in entry:
+        return isinstance(entry["run"], dict) and isinstance(entry.get("scans"), dict)
+    return isinstance(entry.get("key"), str) and isinstance(entry.get("result"), dict)

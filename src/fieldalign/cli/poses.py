@@ -23,15 +23,17 @@ def read_pose(text: str, name: str = "init", scaled: bool = False) -> Matrix:
     """
     import numpy as np
 
+    from ..arguments import as_numbers
     from ..motions import as_rigid, as_similar
 
     try:
-        values = _from_file(Path(text)) if Path(text).is_file() else np.array(text.replace(",", " ").split(), float)
-    except (OSError, ValueError, EOFError) as error:
+        given = _from_file(Path(text)) if Path(text).is_file() else text.replace(",", " ").split()
+        values = as_numbers(given, name)
+    except (OSError, ValueError, EOFError, RecursionError) as error:
         wanted = "a file with a 4 x 4 pose or 16 numbers"
         raise ArgumentError(f"{name} must be {wanted}, but is {text!r}: {error}") from error
-    if np.size(values) != 16:
-        raise ArgumentError(f"{name} must hold 16 numbers (4 x 4, row by row), but {text!r} holds {np.size(values)}")
+    if values.size != 16:
+        raise ArgumentError(f"{name} must hold 16 numbers (4 x 4, row by row), but {text!r} holds {values.size}")
     return (as_similar if scaled else as_rigid)(np.reshape(values, (4, 4)), name)
 
 
@@ -42,7 +44,7 @@ def read_poses(path: str, scans: Sequence[str]) -> list[Any]:
 
     try:
         given = json.loads(Path(path).read_text())
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise ArgumentError(f"poses must be JSON, {{scan: 4 x 4}}, but {path} is not: {error}") from error
     if not isinstance(given, dict):
         raise ArgumentError(f"poses must be JSON, {{scan: 4 x 4}}, but {path} holds no such object")
@@ -52,16 +54,15 @@ def read_poses(path: str, scans: Sequence[str]) -> list[Any]:
 
 
 def _from_file(path: Path) -> Any:
-    import numpy as np
-
-    from ..clouds.formats.numpy import load_npy
-
     if path.suffix == ".npy":
+        from ..clouds.formats.numpy import load_npy
+
         return load_npy(path)
     if path.suffix == ".json":
         content = json.loads(path.read_text())
         return content.get("T_target_source", content) if isinstance(content, dict) else content
-    return np.loadtxt(path)
+    lines = path.read_text(encoding="utf-8-sig").splitlines()
+    return " ".join(line.partition("#")[0].replace(",", " ") for line in lines).split()
 
 
 def read_dof(free: str | None, axis: str | None, centre: str | None) -> Dof | None:

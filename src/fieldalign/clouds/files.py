@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import CloudFileError, MissingExtraError, printable
 from ..whole_file import replacing
-from .cloud import PointCloud
+from .cloud import PointCloud, as_points
 from .formats import e57, kitti, las, mesh, numpy, pcd, ply, text
 
 logger = logging.getLogger("fieldalign")
@@ -88,9 +88,10 @@ def write_cloud(path: PathLike, cloud: PointCloud | ArrayLike) -> None:
     An older file of that name is replaced only when the new one is complete. What the format has no place for
     is left out and named in a warning to the logger "fieldalign".
 
-    Raises CloudFileError where the suffix is not one that can be written, or the file cannot be.
+    Raises CloudFileError where the suffix is not one that can be written, or the file cannot be, and ArgumentError for
+    what is no cloud.
     """
-    cloud = cloud if isinstance(cloud, PointCloud) else PointCloud(np.asarray(cloud))
+    cloud = cloud if isinstance(cloud, PointCloud) else PointCloud(as_points(cloud, "cloud"))
     file = Path(path)
     write = writer_of(path)
     with errors_naming(file, "written"), replacing(file) as temporary:
@@ -133,16 +134,22 @@ def check_existing(file: Path, suffixes: Collection[str]) -> None:
 
 
 def _named_scans(file: Path, read_all: Callable[[Path], Iterator[PointCloud]]) -> Iterator[PointCloud]:
-    with errors_naming(file, "read"):
-        yield from read_all(file)
+    scans = read_all(file)
+    while True:
+        with errors_naming(file, "read"):
+            scan = next(scans, None)
+        if scan is None:
+            return
+        yield scan
 
 
 @contextmanager
 def errors_naming(file: Path, verb: str) -> Iterator[None]:
     """Gives a CloudFileError the name of its file, and makes one of whatever else is raised; what the file itself says
-    in it does nothing to a terminal."""
+    in it does nothing to a terminal. Numbers that are none are no reason: a file may hold any."""
     try:
-        yield
+        with np.errstate(all="ignore"):
+            yield
     except MissingExtraError:
         raise
     except CloudFileError as error:

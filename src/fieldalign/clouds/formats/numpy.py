@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from os import SEEK_CUR
 from pathlib import Path
+from tokenize import TokenError
 from types import SimpleNamespace
 from typing import IO, Any, NamedTuple, cast
 
@@ -42,7 +43,8 @@ def load_npy(path: Path) -> Array:
     """The array of an .npy that holds what it promises; raises CloudFileError or ValueError where it does not."""
     with path.open("rb") as file:
         _check_array(file, path.stat().st_size)
-    return np.asarray(np.load(path, allow_pickle=False))
+        file.seek(0)
+        return np.asarray(np.load(file, allow_pickle=False))
 
 
 def write_npy(path: Path, cloud: PointCloud) -> list[str]:
@@ -105,7 +107,10 @@ def _check_array(file: IO[bytes], size: int) -> _ArrayHeader:
     require_bytes(int.from_bytes(file.read(width), "little"), size - file.tell(), "a header")  # it makes room
     file.seek(-width, SEEK_CUR)
     read_header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-    shape, _, dtype = read_header(file)
+    try:
+        shape, _, dtype = read_header(file)
+    except TokenError as error:  # where NumPy looks for what Python 2 wrote
+        raise CloudFileError("has a header that says nothing") from error
     if dtype.hasobject:
         raise CloudFileError("holds pickled Python objects, which are never loaded")
     present = size - file.tell()

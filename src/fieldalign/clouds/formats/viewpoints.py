@@ -5,12 +5,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...errors import CloudFileError
 from ..cloud import Array
 
 
 def pose_from_quaternion(translation: ArrayLike, wxyz: ArrayLike) -> Array:
-    """The (4, 4) pose; a quaternion of any length but zero is taken for its direction."""
-    w, x, y, z = np.asarray(wxyz, float) / np.linalg.norm(wxyz)
+    """The (4, 4) pose; a quaternion is taken for its direction. Raises CloudFileError where it has none."""
+    length = float(np.linalg.norm(wxyz))
+    if not 0 < length < np.inf:
+        raise CloudFileError(f"has a pose that turns by no quaternion: {list(map(float, wxyz))}")
+    w, x, y, z = np.asarray(wxyz, float) / length
     pose = np.eye(4)
     pose[:3, :3] = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],

@@ -43,6 +43,11 @@ def cloud_of(message: Message, stamp: float | None) -> PointCloud:
 
     Raises CloudFileError with a predicate where the message is not what it says it is.
     """
+    with np.errstate(all="ignore"):  # whatever the bytes are as numbers
+        return _cloud(message, stamp)
+
+
+def _cloud(message: Message, stamp: float | None) -> PointCloud:
     rows = _rows(message)
     columns = {name: rows[name].astype(rows[name].dtype.newbyteorder("=")) for name in rows.dtype.names or ()}
     timed = [name for name in columns if name.lower() in TIMES and columns[name].ndim == 1]
