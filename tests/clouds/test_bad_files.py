@@ -451,6 +451,8 @@ def test_an_npy_whose_header_has_two_gigabytes(tmp_path):
     with zipfile.ZipFile(tmp_path / "a.npz", "w") as archive:
         archive.writestr("points.npy", content)
     refused(tmp_path / "a.npz")
+    (tmp_path / "a.npy").write_bytes(content[:8])  # its own length is missing
+    refused(tmp_path / "a.npy")
 
 
 def test_a_pcd_with_more_lines_than_usual_is_read_where_its_data_are(tmp_path):
