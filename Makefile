@@ -5,7 +5,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 SOURCES := $(shell find src cpp -name '*.py' -o -name '*.hpp' -o -name '*.cpp' -o -name '*.pyi') CMakeLists.txt pyproject.toml
 
-.PHONY: demo test docs lint audit lock mutants dist experiments wheels clean bench-paper bench-any-pose bench-verdict bench-fields \
+.PHONY: demo test docs fuzz races lint audit lock mutants dist experiments wheels clean bench-paper bench-any-pose bench-verdict bench-fields \
 	bench-assemble bench-odometry bench-faults bench-load
 
 demo: $(VENV)/.installed-viz      ## simulate two scans of a room, register them, compare with the truth
@@ -25,6 +25,26 @@ audit: $(VENV)-audit/bin/pip-audit  ## the locked dependencies: hashes, licences
 
 lock: $(VENV)-audit/bin/pip-audit   ## pins every dependency in requirements.lock; remove the file first for the newest ones
 	$(VENV)-audit/bin/python .ci/audit.py --lock
+
+# A core with sanitizers, and what builds it; atheris has wheels for Linux and macOS, and without it this fails.
+SANITIZED := build/sanitized
+
+fuzz: $(SANITIZED)/address,undefined/.built  ## a minute of odd input for readers, core and functions; docs/reliability.md
+	$(BIN)/python fuzz/run.py --core $(<D) --work build/fuzz --seconds 60
+
+races: $(SANITIZED)/thread/.built  ## many callers at once through a core with the thread sanitizer
+	LD_PRELOAD=$$(g++ -print-file-name=libtsan.so) TSAN_OPTIONS=halt_on_error=1 \
+		$(BIN)/python fuzz/races.py --core $(<D)
+
+$(VENV)/.fuzzing: $(VENV)/.installed-test
+	$(BIN)/pip install --quiet 'atheris>=3.0' 'nanobind>=2.4' cmake ninja
+	touch $@
+
+$(SANITIZED)/%/.built: $(VENV)/.fuzzing $(wildcard cpp/*) CMakeLists.txt
+	$(BIN)/cmake -S . -B $(@D) -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN))/ninja \
+		-DPython_EXECUTABLE=$(abspath $(BIN))/python -DCMAKE_BUILD_TYPE=None -DFIELDALIGN_SANITIZE=$*
+	$(BIN)/ninja -C $(@D)
+	touch $@
 
 bench-paper: $(VENV)/.installed-viz  ## the figures of the paper's method; needs ../shared/data or $FIELDALIGN_DATA
 	$(BIN)/python benchmarks/paper.py --output docs/benchmarks

@@ -20,7 +20,9 @@ def test_nothing_is_thinned_to_nothing(dtype):
     assert len(first) == len(count) == 0
 
 
-@pytest.mark.parametrize("bounds", [np.zeros((0, 3)), np.zeros((1, 3)), np.array([[1.0] * 3, [0.0] * 3]), np.full((2, 3), NAN)])
+@pytest.mark.parametrize(
+    "bounds", [np.zeros((0, 3)), np.zeros((1, 3)), np.array([[1.0] * 3, [0.0] * 3]), np.full((2, 3), NAN)]
+)
 def test_bounds_that_are_none(bounds):
     with pytest.raises(ValueError, match=r"bounds|length"):
         _core.thin(np.eye(3), bounds, 1e-3, 1)
@@ -52,7 +54,14 @@ def test_an_occupancy_leaves_out_what_is_not_finite(rng):
 
 @pytest.mark.parametrize(
     ("means", "cell", "margin"),
-    [(row(NAN), 0.1, 0.3), (row(1e300), 0.1, 0.3), (row(5e6), 0.002, 0.006), (row(0.0), 0.1, 37.0), (row(0.0), NAN, 1), (row(0.0), 1, INF)],
+    [
+        (row(NAN), 0.1, 0.3),
+        (row(1e300), 0.1, 0.3),
+        (row(5e6), 0.002, 0.006),
+        (row(0.0), 0.1, 37.0),
+        (row(0.0), NAN, 1),
+        (row(0.0), 1, INF),
+    ],
 )
 def test_a_grid_that_cannot_be(means, cell, margin):
     with pytest.raises(ValueError, match=r"finite|origin|margin|positive|cells"):
