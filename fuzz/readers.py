@@ -23,10 +23,15 @@ import numpy as np
 
 with atheris.instrument_imports(
     include=[
-        "fieldalign.clouds.files", "fieldalign.clouds.formats", "fieldalign.fields.files",
+        "fieldalign.clouds.files",
+        "fieldalign.clouds.formats",
+        "fieldalign.fields.files",
         "fieldalign.fields.volume_files",
-        "fieldalign.odometry.trajectory_files", "fieldalign.odometry.sequences", "fieldalign.assembly.record",
-        "fieldalign.cli.poses", "fieldalign.cli.batch",
+        "fieldalign.odometry.trajectory_files",
+        "fieldalign.odometry.sequences",
+        "fieldalign.assembly.record",
+        "fieldalign.cli.poses",
+        "fieldalign.cli.batch",
     ]
 ):
     from seeds import seeds
@@ -55,6 +60,7 @@ class Target(NamedTuple):
     suffix: str
     read: Callable[[Path], Any]
     written: Callable[[bytes], bytes] = bytes
+    asks_for_more: bool = False  # rosbags reads as many bytes as a record promises: asked for, but not used
 
 
 # ------------------------------------------------------------------------------------------------ what is read
@@ -77,6 +83,12 @@ def read_scans(path: Path) -> None:
 def read_field(path: Path) -> None:
     field = fa.fields.read_field(path)
     sampled(field, np.ascontiguousarray(field.bounds))
+
+
+def read_bag(path: Path) -> None:
+    for frame in fa.read_sequence(path):
+        if frame.cloud is not None:
+            check_cloud(frame.cloud)
 
 
 def read_record(path: Path) -> None:
@@ -190,6 +202,8 @@ TARGETS |= {
     "pairs": Target(".csv", read_rows),
     "record": Target(".jsonl", read_record, with_line_sums),
     "message": Target(".msg", read_message),
+    "bag": Target(".bag", read_bag, asks_for_more=True),
+    "mcap": Target(".mcap", read_bag, asks_for_more=True),
 }
 
 # ------------------------------------------------------------------------------------------------ promises
@@ -205,7 +219,7 @@ def watch(target: Target, path: Path) -> None:
         try:
             target.read(path)
         except fa.FieldalignError as error:
-            if reason := _hidden(error):
+            if (reason := _hidden(error)) and not (target.asks_for_more and reason.startswith("memory")):
                 raise BrokenPromiseError(reason) from error
     loud = [w for w in heard if not any(text in str(w.message) for text in OURS) and w.category is not ResourceWarning]
     if loud:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import shutil
 import struct
 import zlib
 from pathlib import Path
@@ -45,7 +46,7 @@ def seeds(target: str, folder: Path) -> list[bytes]:
     if suffix in ("obj", "off", "stl"):
         write_mesh(folder / f"seed.{suffix}", CORNERS, FACES)
         return [(folder / f"seed.{suffix}").read_bytes(), *EXTRA.get(target, [])]
-    return EXTRA[target]
+    return _bags(folder, suffix) if suffix in ("bag", "mcap") else EXTRA[target]
 
 
 def _written(path: Path) -> list[bytes]:
@@ -54,6 +55,42 @@ def _written(path: Path) -> list[bytes]:
         fa.write_cloud(path, cloud)
         found.append(path.read_bytes())
     return found
+
+
+def _bags(folder: Path, kind: str) -> list[bytes]:
+    """A bag of either version with two scans of four points."""
+    from rosbags import rosbag1, rosbag2
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS1_NOETIC if kind == "bag" else Stores.ROS2_HUMBLE)
+    types, path = store.types, folder / f"seed.{kind}"
+    shutil.rmtree(path, ignore_errors=True)
+    path.unlink(missing_ok=True)
+    plugin = rosbag2.StoragePlugin.MCAP
+    writer = rosbag1.Writer(path) if kind == "bag" else rosbag2.Writer(path, version=9, storage_plugin=plugin)
+    serialize = store.serialize_ros1 if kind == "bag" else store.serialize_cdr
+    name, sequence = "sensor_msgs/msg/PointCloud2", {"seq": 0} if kind == "bag" else {}
+    header = types["std_msgs/msg/Header"](
+        **sequence, stamp=types["builtin_interfaces/msg/Time"](sec=1, nanosec=2), frame_id="lidar"
+    )
+    fields = [types["sensor_msgs/msg/PointField"](axis, 4 * k, 7, 1) for k, axis in enumerate("xyz")]
+    data = CORNERS.astype("<f4").view(np.uint8).ravel()
+    message = types[name](
+        header=header,
+        height=1,
+        width=4,
+        fields=fields,
+        is_bigendian=False,
+        point_step=12,
+        row_step=48,
+        data=data,
+        is_dense=True,
+    )
+    with writer:
+        connection = writer.add_connection("/points", name, typestore=store)
+        for k in range(2):
+            writer.write(connection, k, serialize(message, name))
+    return [path.read_bytes() if kind == "bag" else next(path.glob("*.mcap")).read_bytes()]
 
 
 def _npy(array: Any) -> bytes:

@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import zlib
 
 import numpy as np
 import pytest
@@ -192,3 +193,13 @@ def test_what_has_no_content_of_its_own_is_refused(corner):
     field = fa.fields.CallableField(lambda x: x[:, 0], bounds=[[0, 0, 0], [1, 1, 1]])
     with pytest.raises(fa.ArgumentError, match="clouds 3 cannot be told from another CallableField"):
         identity_of(field, "clouds 3")
+
+
+@pytest.mark.parametrize(
+    "text", [b"[1]", b"{", b"\xff", b"{}", b'{"key": 3, "result": {}}', b'{"run": 1}', b"[" * 5000, b"1"]
+)
+def test_a_line_that_is_no_record_but_has_a_right_checksum(folder, text):
+    lines = lines_of(folder)
+    write_lines(folder, [*lines[:2], b"%08x %s\n" % (zlib.crc32(text), text), *lines[2:]])
+    with pytest.warns(UserWarning, match="line 3 is damaged"):
+        assert keys_of(folder) == [f"key {number}" for number in range(3)]
