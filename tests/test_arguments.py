@@ -46,7 +46,7 @@ def test_masked_numbers_are_missing(dtype):
     assert fa.prepare(given[:, :2]).dropped == 1
 
 
-@pytest.mark.parametrize("T", [np.eye(4) * 1j, np.eye(4) * 1e300, [[HUGE] * 4] * 4, np.diag([1, 1, 1, 1e16])])
+@pytest.mark.parametrize("T", [np.eye(4) * 1j, np.eye(4) * 1e300, [[HUGE] * 4] * 4, np.diag([1, 1, 1, 1e16]), np.diag([1e-310] * 3 + [1])])
 def test_poses_that_are_none(T):
     for name, call in (
         ("T_target_source", lambda: fa.verify(np.eye(3), np.eye(3), T)),
@@ -76,6 +76,20 @@ def test_more_threads_than_anyone_has():
 def test_a_stamp_that_is_no_moment(stamp):
     with pytest.raises(fa.ArgumentError, match=r"^stamp must be a finite number of seconds"):
         fa.Odometry().step(np.eye(3), stamp=stamp)
+
+
+@pytest.mark.parametrize("seconds", [-1, np.nan, "1", HUGE, object])
+def test_a_difference_of_times_that_is_none(seconds):
+    drive = fa.Trajectory(np.arange(3.0), np.tile(np.eye(4), (3, 1, 1)))
+    with pytest.raises(fa.ArgumentError, match=r"^max_difference must be seconds"):
+        fa.evaluate(drive, drive, max_difference=seconds)
+
+
+def test_more_frames_than_any_drive_has():
+    drive = fa.Trajectory(np.arange(3.0), np.tile(np.eye(4), (3, 1, 1)))
+    for delta in (2**63, HUGE):
+        with pytest.raises(fa.ArgumentError, match=r"^delta must be an integer from 1 to"):
+            fa.evaluate(drive, drive, delta=delta)
 
 
 def test_deviations_of_what_float64_does_not_resolve():

@@ -77,7 +77,8 @@ def growth(factor: float) -> Matrix:
 
 def size_of(T: Matrix) -> float:
     """By what a similarity (4, 4) multiplies lengths."""
-    return float(np.cbrt(np.linalg.det(T[:3, :3])))
+    with np.errstate(all="ignore"):  # of what is none
+        return float(np.cbrt(np.linalg.det(T[:3, :3])))
 
 
 def adjoint(T: Matrix) -> Matrix:
@@ -184,11 +185,11 @@ def as_rigid(T: ArrayLike, name: str) -> Matrix:
     if not np.allclose(matrix[3], [0, 0, 0, 1], atol=1e-9):
         raise ArgumentError(f"{name} must end in the row 0 0 0 1, but ends in {matrix[3]}")
     R = matrix[:3, :3]
-    off = np.abs(R @ R.T - np.eye(3)).max()
-    if off > 1e-3 or np.linalg.det(R) < 0:
+    off, grown = np.abs(R @ R.T - np.eye(3)).max(), size_of(matrix)
+    if off > 1e-3 or grown < 0:
         raise ArgumentError(
             f"{name} must be rigid, but its upper left 3 x 3 part is no rotation "
-            f"(R R^T differs from the identity by {off:.3g}, determinant {np.linalg.det(R):.3g})"
+            f"(R R^T differs from the identity by {off:.3g}, determinant {grown**3:.3g})"
         )
     matrix[:3, :3] = nearest_rotation(R)  # a pose that was written with few digits
     matrix[3] = [0, 0, 0, 1]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arguments import is_number
 from ..errors import ArgumentError
 from ..motions import Matrix
 from ..odometry.trajectory import Trajectory
@@ -19,8 +20,11 @@ def associated(truth: Trajectory, other: Trajectory, max_difference: float = 0.0
     As evo pairs them, to the last row: of two equally near ones the earlier; of two that are of one length, `other`
     looks up its poses in `truth`. Where neither has times, the frames' numbers are compared.
 
-    Raises ArgumentError where none belong together, and where only one of both has times.
+    Raises ArgumentError where none belong together, where only one of both has times, and for a max_difference that is
+    no time.
     """
+    if not is_number(max_difference) or not max_difference >= 0:
+        raise ArgumentError(f"max_difference must be seconds, 0 or more, but is {max_difference!r}")
     if truth.has_times != other.has_times:
         names = ("the truth", "the trajectory")[:: 1 if truth.has_times else -1]
         raise ArgumentError(f"{names[0]} has times, but {names[1]} has none (files in KITTI's format hold none): they "

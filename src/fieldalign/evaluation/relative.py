@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arguments import as_count, check_one_of, check_positive
+from ..arguments import MAX_PLACES, as_count, check_one_of, check_positive
 from ..motions import Matrix, inverse
 from .pose_error import PoseErrors
 
@@ -31,7 +31,7 @@ def pairs_apart(poses: Matrix, delta: float, unit: str, all_pairs: bool) -> tupl
     """The rows of poses that are delta apart: of the first and of the last of each pair."""
     check_one_of("unit", unit, UNITS)
     if unit == "frames":
-        step = as_count(delta, "delta", 1)
+        step = as_count(delta, "delta", 1, MAX_PLACES)
         rows = np.arange(0, len(poses), 1 if all_pairs else step)
         return (rows[:-step], rows[step:]) if all_pairs else (rows[:-1], rows[1:])
     check_positive("delta", delta)

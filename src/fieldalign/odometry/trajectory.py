@@ -91,7 +91,7 @@ def _check_finite(array: Matrix, name: str) -> None:
 def _check_rigid(poses: Matrix) -> None:
     _check_finite(poses, "poses")
     R = poses[:, :3, :3]
-    with np.errstate(over="ignore", invalid="ignore"):
+    with np.errstate(all="ignore"):
         off = np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max(axis=(1, 2), initial=0.0)
         is_mirrored = np.linalg.det(R) < 0
     far = np.abs(poses[:, :3, 3]).max(axis=1, initial=0.0) > LARGEST
