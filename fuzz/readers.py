@@ -288,7 +288,9 @@ def one_input(data: bytes, names: list[str], failures: Path) -> None:
     path.write_bytes(target.written(data))
     try:
         watch(target, path)
-    except Exception as error:
+    except (KeyboardInterrupt, SystemExit):
+        raise
+    except BaseException as error:  # a panic in Rust is no Exception
         found = failures / f"{name}-{place_of(error)}"
         if not found.exists():
             found.write_bytes(path.read_bytes())

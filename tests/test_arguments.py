@@ -46,7 +46,9 @@ def test_masked_numbers_are_missing(dtype):
     assert fa.prepare(given[:, :2]).dropped == 1
 
 
-@pytest.mark.parametrize("T", [np.eye(4) * 1j, np.eye(4) * 1e300, [[HUGE] * 4] * 4, np.diag([1, 1, 1, 1e16]), np.diag([1e-310] * 3 + [1])])
+@pytest.mark.parametrize(
+    "T", [np.eye(4) * 1j, np.eye(4) * 1e300, [[HUGE] * 4] * 4, np.diag([1, 1, 1, 1e16]), np.diag([1e-310, 1, 1, 1])]
+)
 def test_poses_that_are_none(T):
     for name, call in (
         ("T_target_source", lambda: fa.verify(np.eye(3), np.eye(3), T)),

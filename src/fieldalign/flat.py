@@ -40,7 +40,7 @@ class FlatCloud:
     points: (N, 2). dropped: NaN rows that were left out.
     """
 
-    def __init__(self, points: ArrayLike, name: str, threads: int, drop_nonfinite: bool) -> None:
+    def __init__(self, points: Any, name: str, threads: int, drop_nonfinite: bool) -> None:
         on_floor = as_array(points, name, "an (N, 2) array of numbers")
         if on_floor.dtype.kind not in "fiu":
             raise ArgumentError(f"{name} must be an (N, 2) array of real numbers, but has dtype {on_floor.dtype}")

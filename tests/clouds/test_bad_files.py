@@ -6,6 +6,7 @@ import struct
 import time
 import tracemalloc
 import zipfile
+from pathlib import Path
 
 import numpy as np
 import pypcd4
@@ -14,8 +15,10 @@ import pytest
 from fieldalign.clouds.cloud import PointCloud
 from fieldalign.clouds.files import FORMATS, read_cloud, read_clouds, write_cloud
 from fieldalign.errors import CloudFileError
+from fieldalign.fields import read_field
 
 RNG = np.random.default_rng(3)
+CRASHERS = Path(__file__).with_name("crashers")
 LIBRARIES = {".las": "laspy", ".laz": "laspy", ".e57": "pye57"}
 TEXTS = [".xyz", ".txt", ".csv", ".obj"]
 PNG = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\0\x02\0\0\0\x02\x08\x02\0\0\0\xfd\xd4\x9as" + bytes(range(256)) * 4
@@ -484,3 +487,14 @@ def test_colours_that_are_no_colours(tmp_path):
     head = "VERSION .7\nFIELDS x y z rgb\nSIZE 4 4 4 8\nTYPE F F F F\nCOUNT 1 1 1 1\nWIDTH 2\nHEIGHT 1\nPOINTS 2\n"
     (tmp_path / "a.pcd").write_text(head + "DATA ascii\n1 2 3 1e300\n4 5 6 nan\n")
     assert len(read_cloud(tmp_path / "a.pcd")) == 2
+
+
+@pytest.mark.parametrize("path", sorted(CRASHERS.iterdir()), ids=lambda path: path.name)
+def test_files_that_the_fuzzer_found(path):
+    """Each raised what it must not, or made NumPy warn: a cloud or a field now, or refused."""
+    for read in (read_cloud, read_field):
+        try:
+            read(path)
+        except CloudFileError as error:
+            assert str(error).startswith(str(path))
+            assert not isinstance(error.__cause__, Warning)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import struct
-from contextlib import closing
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from os import SEEK_END
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -32,7 +33,7 @@ def read(path: Path) -> PointCloud:
         # Extended records may claim any length, and nothing here needs them. Not LazrsParallel: it allocates
         # chunks of whatever size the file claims, and ends the process where it cannot.
         reader = laspy.open(file, closefd=False, read_evlrs=False, laz_backend=laspy.LazBackend.Lazrs)
-        with closing(reader):
+        with closing(reader), _panics_told():
             _check_points(reader.header, file, path.stat().st_size)
             chunks = list(reader.chunk_iterator(CHUNK))
             return _cloud(reader.header, chunks)
@@ -84,6 +85,17 @@ def _laspy() -> Any:
     except ImportError as error:
         raise missing_extra("las", "reading and writing .las and .laz") from error
     return laspy
+
+
+@contextmanager
+def _panics_told() -> Iterator[None]:
+    """Makes a CloudFileError of a panic in lazrs, which Python sees as what is no Exception."""
+    try:
+        yield
+    except BaseException as error:
+        if type(error).__name__ != "PanicException":
+            raise
+        raise CloudFileError(f"is damaged: its compressed points cannot be unpacked ({error})") from error
 
 
 def _check_header(file: BinaryIO, size: int) -> None:

@@ -11,10 +11,11 @@ from ..cloud import Array
 
 def pose_from_quaternion(translation: ArrayLike, wxyz: ArrayLike) -> Array:
     """The (4, 4) pose; a quaternion is taken for its direction. Raises CloudFileError where it has none."""
-    length = float(np.linalg.norm(wxyz))
+    q = np.asarray(wxyz, float)
+    length = float(np.linalg.norm(q))
     if not 0 < length < np.inf:
-        raise CloudFileError(f"has a pose that turns by no quaternion: {list(map(float, wxyz))}")
-    w, x, y, z = np.asarray(wxyz, float) / length
+        raise CloudFileError(f"has a pose that turns by no quaternion: {q.tolist()}")
+    w, x, y, z = q / length
     pose = np.eye(4)
     pose[:3, :3] = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
