@@ -104,8 +104,11 @@ def checked_members(path: Path) -> dict[str, _ArrayHeader]:
 def _check_array(file: IO[bytes], size: int) -> _ArrayHeader:
     version = np.lib.format.read_magic(file)
     length = file.read(2 if version == (1, 0) else 4)
-    require_bytes(int.from_bytes(length, "little"), size - file.tell(), "a header")  # for which NumPy makes room
-    file.seek(-len(length), SEEK_CUR)
+    claimed = int.from_bytes(length, "little")
+    require_bytes(claimed, size - file.tell(), "a header")  # for which NumPy makes room
+    if b"\\" in file.read(claimed):
+        raise CloudFileError("has a header with escapes, of which Python warns")
+    file.seek(-len(length) - claimed, SEEK_CUR)
     read_header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
     try:
         shape, _, dtype = read_header(file)
