@@ -5,6 +5,7 @@ import pytest
 
 import fieldalign as fa
 from fieldalign.arguments import as_array, as_numbers, as_vector, check_positive, is_number
+from fieldalign.odometry.trajectory_files import TrajectoryWriter
 
 HUGE = 10**400  # no float64
 
@@ -85,6 +86,23 @@ def test_a_difference_of_times_that_is_none(seconds):
     drive = fa.Trajectory(np.arange(3.0), np.tile(np.eye(4), (3, 1, 1)))
     with pytest.raises(fa.ArgumentError, match=r"^max_difference must be seconds"):
         fa.evaluate(drive, drive, max_difference=seconds)
+
+
+def test_paths_that_can_be_none(tmp_path):
+    path = f"{tmp_path}/a\0b.txt"
+    drive = fa.Trajectory(np.arange(3.0), np.tile(np.eye(4), (3, 1, 1)))
+    for call in (
+        lambda: fa.read_trajectory(path),
+        lambda: fa.write_trajectory(path, drive),
+        lambda: fa.read_cloud(path),
+        lambda: fa.write_cloud(path, np.eye(3)),
+        lambda: fa.read_sequence(path),
+        lambda: fa.register(path, path),
+        lambda: fa.register_many([(np.eye(3), np.eye(3))], run_folder=path),
+        lambda: TrajectoryWriter(path),
+    ):
+        with pytest.raises(fa.FieldalignError, match=r"a\0b"):
+            call()
 
 
 def test_more_frames_than_any_drive_has():

@@ -46,6 +46,6 @@ def _write(content: bytes, path: str | os.PathLike[str]) -> Path:
     try:
         with replacing(path) as unfinished:
             unfinished.write_bytes(content)
-    except OSError as error:
-        raise ArgumentError(f"{path} cannot be written: {error.strerror or error}") from error
+    except (OSError, ValueError) as error:  # ValueError: what can be no path
+        raise ArgumentError(f"{path} cannot be written: {getattr(error, 'strerror', None) or error}") from error
     return Path(path)

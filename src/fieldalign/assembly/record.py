@@ -153,13 +153,13 @@ def naming_errors(path: Path) -> Iterator[None]:
     """Makes one clear RunError of what the system refuses when `path` is written."""
     try:
         yield
-    except OSError as error:
-        if error.errno in (errno.ENOSPC, errno.EDQUOT):
+    except (OSError, ValueError) as error:  # ValueError: what can be no path
+        if getattr(error, "errno", None) in (errno.ENOSPC, errno.EDQUOT):
             raise RunError(
                 f"the disk of {path.parent} is full: what is recorded stays, and the run goes on from there "
                 "when there is room"
             ) from error
-        raise RunError(f"{path} cannot be written: {error.strerror or error}") from error
+        raise RunError(f"{path} cannot be written: {getattr(error, 'strerror', None) or error}") from error
 
 
 def _plain(value: Mapping[str, Any]) -> dict[str, Any]:

@@ -21,7 +21,7 @@ class LineFile:
         self.path = Path(path)
         try:
             self._file = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_APPEND | _BINARY, 0o666)
-        except OSError as error:
+        except (OSError, ValueError) as error:  # ValueError: what can be no path
             raise self._refused(error) from error
 
     def add(self, line: str) -> None:
@@ -48,5 +48,5 @@ class LineFile:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _refused(self, error: OSError) -> RunError:
-        return RunError(f"{self.path} cannot be written: {error.strerror or error}")
+    def _refused(self, error: OSError | ValueError) -> RunError:
+        return RunError(f"{self.path} cannot be written: {getattr(error, 'strerror', None) or error}")

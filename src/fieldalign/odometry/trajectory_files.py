@@ -32,8 +32,12 @@ def read_trajectory(path: str | os.PathLike[str], format: str = "auto") -> Traje
     try:
         with open(path, encoding="utf-8-sig") as file:
             rows = _rows(file, path, COLUMNS.get(format))
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is no text"
+    except ArgumentError:
+        raise
+    except UnicodeDecodeError as error:
+        raise ArgumentError(f"{path} cannot be read as a trajectory: it is no text") from error
+    except (OSError, ValueError) as error:  # ValueError: what can be no path
+        reason = getattr(error, "strerror", None) or error
         raise ArgumentError(f"{path} cannot be read as a trajectory: {reason}") from error
     has_times = rows.shape[1] == COLUMNS["tum"]
     times, poses = _from_tum(rows, path) if has_times else _from_kitti(rows)
@@ -53,8 +57,8 @@ def write_trajectory(path: str | os.PathLike[str], trajectory: Trajectory, forma
         with replacing(path) as unfinished, open(unfinished, "w", encoding="ascii", newline="\n") as file:
             for time, pose in zip(trajectory.times, trajectory.poses, strict=True):
                 file.write(_line(format, time, pose) + "\n")
-    except OSError as error:
-        raise ArgumentError(f"{path} cannot be written: {error.strerror or error}") from error
+    except (OSError, ValueError) as error:  # ValueError: what can be no path
+        raise ArgumentError(f"{path} cannot be written: {getattr(error, 'strerror', None) or error}") from error
 
 
 class TrajectoryWriter:
