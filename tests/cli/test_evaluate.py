@@ -118,7 +118,7 @@ def test_a_cameras_drive_is_drawn_from_above(call, scans, monkeypatch):
         (("kitti.txt", "truth_tum.txt"), "the truth has times, but the trajectory has none"),
         (("tum.txt", "late.txt"), "no pose lies within 0.01 s of one of the truth: its times go from 100 to 129.9"),
         (("part.txt", "truth_tum.txt", "--by-row"), "as many poses as the truth"),
-        (("tum.txt", "truth_tum.txt", "--delta", "1.5"), "delta must be an integer of at least 1"),
+        (("tum.txt", "truth_tum.txt", "--delta", "1.5"), "delta must be an integer from 1 to 10000000"),
         (("tum.txt", "truth_tum.txt", "--json", "no/folder/a.json"), "there is no folder"),
         (("tum.txt", "truth_tum.txt", "--plot", "a.bmp"), "path"),
         (("tum.txt", "camera.txt", "--calib", "tum.txt"), "is no calibration of KITTI"),
