@@ -92,7 +92,7 @@ def main() -> int:
         jobs["functions"].terminate()  # what it has tried by now has held
         jobs["functions"].wait()
     broken += [name for name in ("readers", "functions") if jobs[name].wait() > 0]
-    broken += ["readers"] * any((options.work / "readers" / "failures").iterdir())
+    broken += ["readers"] * any((options.work / "readers" / "failures").glob("*"))
     for name, log in logs.items():
         print(f"{name}: {WATCHED[name](log.read_text(errors='replace'))}")
     for name in sorted(set(broken)):

@@ -71,7 +71,7 @@ def _rows(message: Message) -> Array:
         raise CloudFileError(f"has rows of {row_step} bytes, but {width} points of {message.point_step} bytes in each")
     data = np.ascontiguousarray(message.data).view(np.uint8)
     needed = row_step * (height - 1) + message.point_step * width if height * width else 0
-    require_bytes(needed, len(data), f"{height * width} points")
+    require_bytes(max(needed, height * width), len(data), f"{height * width} points")  # of a byte at least
     return np.ndarray((height, width), dtype, data, 0, (row_step, message.point_step)).ravel()
 
 
