@@ -16,6 +16,7 @@ from fieldalign.cli.poses import read_pose
         ("a.npy", b"\x93NUMPY\x01\x00\x20\x00{'descr': '<f8', 'shape': (4L,      \n"),
         ("a.npy", b"\x93NUMPY\x02\x00\xff\xff\xff\x7f{}"),
         ("a.npy", b"\x93NUMPY\xff\xff"),
+        ("a.npy", b"\x93NUMPY\x01\x00\x20\x00{'descr': '<f8', 'shape': (04,)}   \n"),
         ("a.txt", b""),
         ("a.txt", b"# nothing\n"),
         ("a.txt", b"\xff\xfe"),

@@ -112,7 +112,7 @@ def _check_array(file: IO[bytes], size: int) -> _ArrayHeader:
     read_header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
     try:
         shape, _, dtype = read_header(file)
-    except TokenError as error:  # where NumPy looks for what Python 2 wrote
+    except (SyntaxError, TokenError) as error:  # where NumPy looks for what Python 2 wrote
         raise CloudFileError("has a header that says nothing") from error
     if dtype.hasobject:
         raise CloudFileError("holds pickled Python objects, which are never loaded")
