@@ -225,6 +225,7 @@ def test_what_is_no_sequence_is_one_clear_error(tmp_path, make, words):
 @pytest.mark.parametrize("line", [
     "noon", "2011-13-01 00:00:00", "nan", "inf", "1 2",
     "2011-09-26T13:02:25-0100", "2011-09-26 13:02:25Z", "2300-01-01 00:00:00", "9999-01-01 00:00:00",
+    "2011-09-26 13:02:25." + "3" * 80,
 ])  # the last ones: time zones, and years for which 64 bits have no nanoseconds
 def test_what_is_no_time_is_one_clear_error(tmp_path, line):
     (tmp_path / "times.txt").write_text(f"1\n{line}\n")

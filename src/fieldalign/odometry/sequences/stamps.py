@@ -9,7 +9,7 @@ import numpy as np
 
 from ...errors import CloudFileError
 
-_DATE = re.compile(r"(1[7-9]|2[01])\d\d-\d\d-\d\d([T ]\d\d:\d\d(:\d\d(\.\d+)?)?)?", re.ASCII)  # UTC
+_DATE = re.compile(r"(1[7-9]|2[01])\d\d-\d\d-\d\d([T ]\d\d:\d\d(:\d\d(\.\d{1,18})?)?)?", re.ASCII)  # UTC
 
 
 def read_stamps(path: Path) -> list[float]:
@@ -39,6 +39,6 @@ def read_stamps(path: Path) -> list[float]:
 def _seconds(text: str) -> float:
     if "-" not in text[1:].lower().replace("e-", ""):
         return float(text)
-    if not _DATE.fullmatch(text):  # a time zone, or a year for which 64 bits have no nanoseconds
+    if not _DATE.fullmatch(text):  # a time zone, too many digits, or a year beyond 64 bits of nanoseconds
         raise ValueError
     return int(np.datetime64(text.replace(" ", "T", 1), "ns").astype(np.int64)) / 1e9
