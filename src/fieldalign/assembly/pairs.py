@@ -13,6 +13,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import as_numbers
 from ..errors import ArgumentError
 from ..fields.protocol import Floats
 from ..flat import FlatCloud
@@ -114,10 +115,7 @@ def _anywhere(cloud: CloudLike) -> CloudLike:
 
 
 def _as_matrix(init: ArrayLike, name: str) -> Floats:
-    try:
-        matrix = np.array(init, float)
-    except (TypeError, ValueError) as error:
-        raise ArgumentError(f"{name} must be a (4, 4) matrix of numbers, but is {_short(init)}") from error
+    matrix = as_numbers(init, name, "a (4, 4) matrix of numbers")
     if matrix.shape not in ((4, 4), (3, 3)):
         raise ArgumentError(f"{name} must be a (4, 4) matrix, but has shape {matrix.shape}")
     return matrix
