@@ -38,6 +38,8 @@ WHOLE = {
     ".csv": lambda path: path.read_text()[-1:] in ("\n", "") or pytest.fail("torn"),
     ".txt": lambda path: path.read_text()[-1:] in ("\n", "") or pytest.fail("torn"),
     ".md": lambda path: path.read_text().endswith("\n") or pytest.fail("torn"),
+    ".jsonl": lambda path: path.read_text()[-1:] in ("\n", "") or pytest.fail("torn"),
+    "": lambda path: path.name == "lock" or pytest.fail("unknown"),  # of a run, which holds nothing
 }
 
 

@@ -43,7 +43,7 @@ _STRAY = 0.1                # of the extent: how far they are shifted
 class Start:
     """init: (4, 4), a guess of T_target_source, or None. searches: whether poses are searched for, within `radius` (the
     clouds' unit) and `angle` (rad) of the guess where there is one. dof: what is free, counted from the guess, or None:
-    all. grows: whether the scale is free, too."""
+    all. grows: whether the scale is free, too. by_points: whether clouds without surfels are tried by their points."""
 
     init: Floats | None
     searches: bool
@@ -51,6 +51,7 @@ class Start:
     angle: float = np.pi
     dof: Dof | None = None
     grows: bool = False
+    by_points: bool = True
 
     @property
     def searches_everywhere(self) -> bool:
@@ -82,7 +83,7 @@ def register_robust(
     clock.lap("refine")
     best, *others = judged(pair, refined, contest, threads)
     clock.lap("judge")
-    if start.searches and not refined[0].meets and is_for_points(pair, best.reason):
+    if start.searches and start.by_points and not refined[0].meets and is_for_points(pair, best.reason):
         by_them = by_points(pair, refined[0], start.angle, seed, threads)
         if by_them is not refined[0]:
             best, *others = judged(pair, [by_them], contest, threads)

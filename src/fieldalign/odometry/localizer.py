@@ -16,9 +16,9 @@ from ..clouds.cloud import PointCloud, as_points
 from ..clouds.files import read_cloud
 from ..errors import ArgumentError
 from ..fields.protocol import Floats
-from ..prepare import CloudLike, prepare_named
+from ..methods import Start, register_robust
+from ..prepare import prepare_named
 from ..prepared import PreparedCloud
-from ..register import register
 from ..result import RegistrationResult
 from ..threads import resolve_threads
 from .hold import Hold
@@ -184,16 +184,20 @@ class Localizer:
         best = max(there, key=lambda p: (p.result.accepted, p.matched.score))
         return best if is_clear and best.matched.score >= _LEAST_SCORE else None
 
-    def _source(self, sweep: Sweep) -> CloudLike:
+    def _source(self, sweep: Sweep) -> PreparedCloud:
         """What of a scan is searched for: as much as a tile may show."""
         assert self._measure is not None
         reach, points = self._measure.range / _BEYOND, np.asarray(sweep.points, float)
         near = points[((points**2).sum(axis=1) < reach**2) & (points != 0).any(axis=1)]  # NaN is far
-        return prepare_named(PointCloud(near, viewpoint=np.eye(4)), "cloud", self._threads, True)
+        prepared = prepare_named(PointCloud(near, viewpoint=np.eye(4)), "cloud", self._threads, True)
+        assert isinstance(prepared, PreparedCloud)  # points (N, 3)
+        return prepared
 
-    def _on_tile(self, source: CloudLike, scan: Scan, tile: PreparedCloud) -> _Found | None:
+    def _on_tile(self, source: PreparedCloud, scan: Scan, tile: PreparedCloud) -> _Found | None:
         """The best pose on a part of the map, and how the scan lies there on its planes."""
-        result = register(source, tile, seed=self._seed, threads=self._threads)
+        # Not by points: a scan in which there are no surfaces has no place among those of a map.
+        start = Start(None, searches=True, by_points=False)
+        result = register_robust(source, tile, start, self._seed, self._threads, Clock())
         if result.evidence is None or result.evidence.strength < _LEAST_STRENGTH:
             return None
         guess, motion = result.T_target_source, SteadyMotion(self._map.voxel)
