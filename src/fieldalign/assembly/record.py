@@ -22,7 +22,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
-from ..errors import RunError
+from ..errors import FieldalignError, RunError
 from .lock import only_one
 
 FORMAT = 1
@@ -153,6 +153,8 @@ def naming_errors(path: Path) -> Iterator[None]:
     """Makes one clear RunError of what the system refuses when `path` is written."""
     try:
         yield
+    except FieldalignError:  # a clear error already, though it be a ValueError, too
+        raise
     except (OSError, ValueError) as error:  # ValueError: what can be no path
         if getattr(error, "errno", None) in (errno.ENOSPC, errno.EDQUOT):
             raise RunError(
@@ -190,4 +192,4 @@ def _is_entry(entry: Any) -> bool:
         return False
     if "run" in entry:
         return isinstance(entry["run"], dict) and isinstance(entry.get("scans"), dict)
-    return isinstance(entry.get("key"), str) and isinstance(entry.get("result"), dict)
+    return isinstance(entry.get("key"), str) and isinstance(entry.get("result"), dict | list)
