@@ -52,6 +52,16 @@ def as_vector(value: object, name: str) -> NDArray[np.float64]:
     return vector
 
 
+def as_square(value: Any, name: str, edge: int, use: str = "") -> NDArray[np.float64]:
+    """A new matrix (edge, edge) of finite numbers; raises ArgumentError that names the argument."""
+    matrix = as_numbers(value, name, f"a ({edge}, {edge}) matrix of numbers")
+    if matrix.shape != (edge, edge):
+        raise ArgumentError(f"{name} must be a ({edge}, {edge}) matrix{use}, but has shape {matrix.shape}")
+    if not np.isfinite(matrix).all():
+        raise ArgumentError(f"{name} must be finite, but holds NaN or infinity")
+    return matrix
+
+
 def as_array(value: Any, name: str, wanted: str, kind: type[ArgumentError] = ArgumentError) -> NDArray[Any]:
     """What NumPy makes of a value; masked numbers are missing ones, NaN. Raises an error of that kind, which names the
     argument and what it must be."""

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _core
-from .arguments import as_array, as_numbers
+from .arguments import as_array, as_square
 from .clouds.checks import Checked, checked_points
 from .dof import Dof
 from .errors import ArgumentError
@@ -114,11 +114,7 @@ def standing(source: FlatCloud, target: FlatCloud, scaled: bool) -> tuple[Prepar
 
 def upright(T: ArrayLike, name: str) -> Floats:
     """The (4, 4) motion of a (3, 3) one in the plane; raises ArgumentError where it is none."""
-    flat = as_numbers(T, name, "a (3, 3) matrix of numbers")
-    if flat.shape != (3, 3):
-        raise ArgumentError(f"{name} must be a (3, 3) matrix for clouds in the plane, but has shape {flat.shape}")
-    if not np.isfinite(flat).all():
-        raise ArgumentError(f"{name} must be finite, but holds NaN or infinity")
+    flat = as_square(T, name, 3, " for clouds in the plane")
     lifted = np.eye(4)
     lifted[:2, :2], lifted[:2, 3], lifted[3, [0, 1, 3]] = flat[:2, :2], flat[:2, 2], flat[2]
     with np.errstate(over="ignore"):

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core
-from .arguments import LARGEST, as_numbers
+from .arguments import LARGEST, as_square
 from .errors import ArgumentError
 
 Matrix = NDArray[np.float64]
@@ -198,11 +198,7 @@ def as_rigid(T: ArrayLike, name: str) -> Matrix:
 
 def _as_pose(T: ArrayLike, name: str) -> Matrix:
     """A (4, 4) matrix of numbers of which none is so large that products of two overflow."""
-    matrix = as_numbers(T, name, "a (4, 4) matrix of numbers")
-    if matrix.shape != (4, 4):
-        raise ArgumentError(f"{name} must be a (4, 4) matrix, but has shape {matrix.shape}")
-    if not np.isfinite(matrix).all():
-        raise ArgumentError(f"{name} must be finite, but holds NaN or infinity")
+    matrix = as_square(T, name, 4)
     if np.abs(matrix).max() > LARGEST:
         raise ArgumentError(f"{name} must hold numbers below {LARGEST:g}, but holds {np.abs(matrix).max():g}")
     return matrix

@@ -31,18 +31,19 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 def write_text(text: str, path: str | os.PathLike[str]) -> Path:
-    """Writes a file, whole or not at all; returns the path. Raises ArgumentError where it cannot be written."""
-    return _write(text.encode(), path)
+    """Writes a text, as write_bytes."""
+    return write_bytes(text.encode(), path)
 
 
 def write_figure(figure: Any, path: str | os.PathLike[str]) -> Path:
-    """Writes a figure of matplotlib in the format that the suffix names; otherwise as write_text."""
+    """Writes a figure of matplotlib in the format that the suffix names; otherwise as write_bytes."""
     picture = io.BytesIO()  # matplotlib and its encoders come to harm in their own ways on a full disk
     figure.savefig(picture, format=Path(path).suffix[1:].lower())
-    return _write(picture.getvalue(), path)
+    return write_bytes(picture.getvalue(), path)
 
 
-def _write(content: bytes, path: str | os.PathLike[str]) -> Path:
+def write_bytes(content: bytes, path: str | os.PathLike[str]) -> Path:
+    """Writes a file, whole or not at all; returns the path. Raises ArgumentError where it cannot be written."""
     try:
         with replacing(path) as unfinished:
             unfinished.write_bytes(content)

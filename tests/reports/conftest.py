@@ -233,6 +233,17 @@ def reader():
 
 
 @pytest.fixture(scope="session")
+def data_of():
+    """data_of(path): what the scripts of a page find."""
+
+    def read(path):
+        data = r'<script type="application/json" id="data">(.*?)</script>'
+        return json.loads(re.search(data, path.read_text("utf-8"), re.DOTALL)[1])
+
+    return read
+
+
+@pytest.fixture(scope="session")
 def sound():
     """sound(path): that a page is well formed, names what it refers to, has a name for every control and picture, and
     asks nothing of a network."""

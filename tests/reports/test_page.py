@@ -41,13 +41,13 @@ def report(clouds, result, tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def data(report):
-    return data_of(report)
+def scene_of(data_of):
+    return lambda path: data_of(path)["scenes"][0]
 
 
-def data_of(path):
-    found = re.search(r'<script type="application/json" id="data">(.*?)</script>', path.read_text("utf-8"), re.DOTALL)
-    return json.loads(found[1])["scenes"][0]
+@pytest.fixture(scope="module")
+def data(report, scene_of):
+    return scene_of(report)
 
 
 def unpacked(packed):
@@ -94,7 +94,7 @@ def test_the_same_result_gives_the_same_bytes(clouds, result, report, tmp_path):
     assert again.read_bytes() == report.read_bytes()
 
 
-def test_a_report_of_millions_of_points_stays_small(rng, tmp_path):
+def test_a_report_of_millions_of_points_stays_small(rng, tmp_path, scene_of):
     points = rng.uniform(-1, 1, (1_000_000, 3))
     face = rng.integers(0, 3, len(points))
     points[np.arange(len(points)), face] = np.sign(points[np.arange(len(points)), face])
@@ -102,7 +102,7 @@ def test_a_report_of_millions_of_points_stays_small(rng, tmp_path):
     result = fa.verify(source, target, translation([1.0, 0, 0]), search=False)
     path = write_report(result, source, target, tmp_path / "large.html")
     assert path.stat().st_size < 5e6
-    assert len(unpacked(data_of(path)["clouds"]["source"])) == 100_000
+    assert len(unpacked(scene_of(path)["clouds"]["source"])) == 100_000
 
 
 @pytest.mark.parametrize("name", ["report.txt", "nowhere/report.html", "report"])
@@ -130,17 +130,17 @@ def test_the_view_holds_both_clouds_and_the_motion_between_them(clouds, result, 
     assert np.allclose(np.linalg.norm(data["up"]), 1)
 
 
-def test_the_view_stays_sharp_far_from_the_origin(clouds, tmp_path):
+def test_the_view_stays_sharp_far_from_the_origin(clouds, tmp_path, scene_of):
     source, target, T = clouds
     far = np.array([4.5e6, 5.4e6, 200.0])
     motion = T @ translation(-far)
     result = fa.verify(source + far, target, motion, search=False)
-    data = data_of(write_report(result, source + far, target, tmp_path / "far.html"))
+    data = scene_of(write_report(result, source + far, target, tmp_path / "far.html"))
     end = after(data, unpacked(data["clouds"]["source"])) + np.median(target, axis=0)
     assert np.abs(end - apply(T, source)).max() < 1e-4
 
 
-def test_a_report_in_the_plane_and_one_with_a_scale(tmp_path):
+def test_a_report_in_the_plane_and_one_with_a_scale(tmp_path, scene_of):
     rng = np.random.default_rng(1)
     u = rng.uniform(0, 1, 1500)
     plan = np.r_[np.c_[4 * u, 0 * u], np.c_[0 * u, 3 * u], np.c_[4 * u, 3 - 0.4 * u], np.c_[1 + u, 1 + 0.3 * u]]
@@ -148,7 +148,7 @@ def test_a_report_in_the_plane_and_one_with_a_scale(tmp_path):
     moved = plan @ np.array([[c, s], [-s, c]]) + [1.0, 2.0]
     flat = fa.register(plan, moved)
     page = write_report(flat, plan, moved, tmp_path / "flat.html")
-    data = data_of(page)
+    data = scene_of(page)
     end = after(data, unpacked(data["clouds"]["source"]))
     near = fa.fields.PointField(unpacked(data["clouds"]["target"])).sample(end).value
     assert np.percentile(near, 90) < 0.05
@@ -156,14 +156,14 @@ def test_a_report_in_the_plane_and_one_with_a_scale(tmp_path):
     grown = fa.register(2.5 * plan, moved, scale=True)
     page = write_report(grown, 2.5 * plan, moved, tmp_path / "grown.html")
     assert "grown by" in page.read_text("utf-8")
-    data = data_of(page)
+    data = scene_of(page)
     assert np.isclose(data["motions"][0]["growth"], 0.4, rtol=1e-3)
 
 
-def test_a_report_of_the_papers_method_shows_its_own_pseudo_points(clouds, tmp_path):
+def test_a_report_of_the_papers_method_shows_its_own_pseudo_points(clouds, tmp_path, scene_of):
     source, target = map(fa.prepare, clouds[:2])
     result = fa.register(source, target, init=clouds[2], method="paper")
-    data = data_of(write_report(result, source, target, tmp_path / "paper.html"))
+    data = scene_of(write_report(result, source, target, tmp_path / "paper.html"))
     assert data["pseudo"]["of"] == "target"
     found = unpacked(data["pseudo"]) + np.median(clouds[1], axis=0)
     assert np.abs(found - target.last_pseudo_points).max() < 1e-3
@@ -415,7 +415,7 @@ def test_a_scan_named_as_a_script_does_nothing(browser, clouds, result, tmp_path
     browser.complaints.clear()
 
 
-def test_alternatives_can_be_looked_at(chromium, tmp_path, seen):
+def test_alternatives_can_be_looked_at(chromium, tmp_path, seen, scene_of):
     rng = np.random.default_rng(0)
     points = rng.uniform(-1, 1, (6000, 3))
     face = rng.integers(0, 3, len(points))
@@ -424,7 +424,7 @@ def test_alternatives_can_be_looked_at(chromium, tmp_path, seen):
     result = fa.register(points[:3000], points[3000:])
     assert result.alternatives
     path = write_report(result, points[:3000], points[3000:], tmp_path / "box.html")
-    data = data_of(path)
+    data = scene_of(path)
     end = after(data, unpacked(data["clouds"]["source"]), motion=1) + np.median(points[3000:], axis=0)
     assert np.allclose(end, apply(result.alternatives[0].T_target_source, points[:3000]), atol=1e-3)
     chromium.open(path)

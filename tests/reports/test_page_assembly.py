@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import json
 import re
 from dataclasses import replace
 
@@ -36,11 +35,6 @@ def assembly(clouds):
 @pytest.fixture(scope="module")
 def report(assembly, clouds, tmp_path_factory):
     return write_assembly_report(assembly, clouds, tmp_path_factory.mktemp("report") / "all.html", NAMES, "four scans")
-
-
-def data_of(path):
-    found = re.search(r'<script type="application/json" id="data">(.*?)</script>', path.read_text("utf-8"), re.DOTALL)
-    return json.loads(found[1])
 
 
 def rows_of(path):
@@ -84,7 +78,7 @@ def test_what_is_not_believed_comes_first_then_what_fits_worst(assembly, clouds,
     assert 'class="edge doubted" data-pair="0"' in path.read_text("utf-8")
 
 
-def test_the_model_is_packed_with_the_scan_of_each_point(report, assembly):
+def test_the_model_is_packed_with_the_scan_of_each_point(report, assembly, data_of):
     (model,) = data_of(report)["models"]
     cloud = model["layers"]["cloud"]
     steps = np.frombuffer(base64.b64decode(cloud["points"]), "<i2").reshape(-1, 3)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 
 import numpy as np
@@ -37,16 +36,11 @@ def report(pairs, results, tmp_path_factory):
     return write_batch_report(results, pairs, tmp_path_factory.mktemp("report") / "batch.html", "three <pairs>")
 
 
-def data_of(path):
-    found = re.search(r'<script type="application/json" id="data">(.*?)</script>', path.read_text("utf-8"), re.DOTALL)
-    return json.loads(found[1])
-
-
 def test_the_page_is_sound(report, sound):
     sound(report)
 
 
-def test_what_failed_comes_first_and_has_no_picture(report, results):
+def test_what_failed_comes_first_and_has_no_picture(report, results, data_of):
     data = data_of(report)
     assert [pair["scene"] is None for pair in data["pairs"]] == [True, False, False]
     assert "does not exist" in data["pairs"][0]["verdict"]
@@ -61,7 +55,7 @@ def test_the_page_is_the_same_again_and_holds_no_element_from_outside(report, re
     assert "<img" not in report.read_text("utf-8")
 
 
-def test_only_the_weakest_of_many_have_pictures(monkeypatch, results, pairs, tmp_path):
+def test_only_the_weakest_of_many_have_pictures(monkeypatch, results, pairs, tmp_path, data_of):
     monkeypatch.setattr(pair_table, "_PICTURES", 2)
     asked = []
     path = write_batch_report(results, pairs, tmp_path / "few.html", progress=lambda done, of: asked.append((done, of)))
@@ -69,14 +63,14 @@ def test_only_the_weakest_of_many_have_pictures(monkeypatch, results, pairs, tmp
     assert asked == [(0, 2), (1, 2)]
 
 
-def test_a_table_of_very_many_holds_the_weakest(monkeypatch, results, pairs, tmp_path):
+def test_a_table_of_very_many_holds_the_weakest(monkeypatch, results, pairs, tmp_path, data_of):
     monkeypatch.setattr(pair_table, "_ROWS", 2)
     path = write_batch_report(results, pairs, tmp_path / "first.html")
     assert len(data_of(path)["pairs"]) == 2
     assert "The first 2 of 3." in path.read_text("utf-8")
 
 
-def test_clouds_that_are_gone_leave_their_rows(results, pairs, tmp_path):
+def test_clouds_that_are_gone_leave_their_rows(results, pairs, tmp_path, data_of):
     gone = [(str(tmp_path / "gone.npy"), target) for _, target in pairs]
     path = write_batch_report(results, gone, tmp_path / "gone.html")
     assert data_of(path)["scenes"] == []

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from functools import partial
 
@@ -46,11 +45,6 @@ def report(results, tmp_path_factory):
     return write_experiment_report([results], tmp_path_factory.mktemp("report") / "experiment.html", EVIL)
 
 
-def data_of(path):
-    found = re.search(r'<script type="application/json" id="data">(.*?)</script>', path.read_text("utf-8"), re.DOTALL)
-    return json.loads(found[1])
-
-
 def words_of(path):
     return re.findall(r'<span class="mark">([^<]*)</span>', path.read_text("utf-8"))
 
@@ -59,7 +53,7 @@ def test_the_page_is_sound(report, sound):
     sound(report)
 
 
-def test_the_worst_comes_first(report):
+def test_the_worst_comes_first(report, data_of):
     assert words_of(report) == ["wrong, yet accepted", "no pose", "wrong", "right", "right", "right"]
     data = data_of(report)
     assert [pair["scene"] for pair in data["pairs"]] == [0, 1, 2, 3, 4, 5]
@@ -67,7 +61,7 @@ def test_the_worst_comes_first(report):
     assert data["pairs"][1]["verdict"].startswith(f"No pose: no {EVIL}")
 
 
-def test_each_picture_holds_what_was_found_and_the_truth(report):
+def test_each_picture_holds_what_was_found_and_the_truth(report, data_of):
     wrong, without, *_ = data_of(report)["scenes"]
     assert [motion["name"] for motion in wrong["motions"]] == ["as found", "the truth"]
     assert [motion["name"] for motion in without["motions"]] == ["the truth"]
@@ -89,7 +83,7 @@ def test_symmetry_counts_where_there_may_be_some(results, tmp_path):
     assert words_of(write_experiment_report([again], tmp_path / "symmetric.html")).count("right") == 5
 
 
-def test_only_the_worst_of_many_have_pictures_and_rows(monkeypatch, results, tmp_path):
+def test_only_the_worst_of_many_have_pictures_and_rows(monkeypatch, results, tmp_path, data_of):
     monkeypatch.setattr(page_experiment, "_PICTURES", 2)
     monkeypatch.setattr(pair_table, "_ROWS", 4)
     asked = []
@@ -101,7 +95,7 @@ def test_only_the_worst_of_many_have_pictures_and_rows(monkeypatch, results, tmp
     assert asked == [(0, 2), (1, 2)]
 
 
-def test_parts_share_one_table(corner, results, tmp_path):
+def test_parts_share_one_table(corner, results, tmp_path, data_of):
     path = write_experiment_report([results, results_of(corner, "Another part")], tmp_path / "parts.html")
     assert len(data_of(path)["pairs"]) == 12
     assert path.read_text("utf-8").count('class="part"') == 2

@@ -63,7 +63,7 @@ class RunRecord:
             self._go_on(_plain(run), _plain(scans))
             self._opened = opened.pop_all()
 
-    def add(self, key: str, result: Mapping[str, Any]) -> None:
+    def add(self, key: str, result: Mapping[str, Any] | list[Any]) -> None:
         """Records what came of a piece of work."""
         self._append({"key": key, "result": result})
         if monotonic() - self._synced >= _SYNCED:

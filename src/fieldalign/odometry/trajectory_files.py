@@ -15,7 +15,7 @@ import numpy as np
 from ..arguments import check_one_of
 from ..errors import ArgumentError
 from ..motions import Matrix, quaternions_of, rotations_of
-from ..whole_file import replacing
+from ..whole_file import write_text
 from .line_file import LineFile
 from .trajectory import Trajectory
 
@@ -53,12 +53,8 @@ def write_trajectory(path: str | os.PathLike[str], trajectory: Trajectory, forma
     Raises ArgumentError where the format is neither or the file cannot be written.
     """
     check_one_of("format", format, FORMATS)
-    try:
-        with replacing(path) as unfinished, open(unfinished, "w", encoding="ascii", newline="\n") as file:
-            for time, pose in zip(trajectory.times, trajectory.poses, strict=True):
-                file.write(_line(format, time, pose) + "\n")
-    except (OSError, ValueError) as error:  # ValueError: what can be no path
-        raise ArgumentError(f"{path} cannot be written: {getattr(error, 'strerror', None) or error}") from error
+    lines = (_line(format, *at) + "\n" for at in zip(trajectory.times, trajectory.poses, strict=True))
+    write_text("".join(lines), path)
 
 
 class TrajectoryWriter:

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ArgumentError, missing_extra
+from ..errors import missing_extra
 from ..motions import Matrix
 from ..odometry.trajectory import Trajectory
-from ..whole_file import replacing
+from ..whole_file import write_bytes
 from .cloud_picture import COLORS, Layer
 from .painting import Array
 
@@ -80,13 +80,7 @@ def _begin(title: str) -> tuple[Any, Any]:
 
 
 def _save(recording: Any, path: str | os.PathLike[str]) -> Path:
-    data = recording.memory.drain_as_bytes()
-    try:
-        with replacing(path) as unfinished:
-            unfinished.write_bytes(data)
-    except OSError as error:
-        raise ArgumentError(f"{path} cannot be written: {error.strerror or error}") from error
-    return Path(path)
+    return write_bytes(recording.memory.drain_as_bytes(), path)
 
 
 def _points(rr: Any, points: Array, colors: Array) -> Any:
